@@ -58,7 +58,7 @@ const rl_value *rl_value_at(const rl_value *root, const char *path);
 /* "a number", "a list", "the text 'foo'", "null": for "expected …, found …". Uses buf (>= 96 bytes). */
 const char *rl_value_describe(const rl_value *v, char *buf);
 /* The value as compact YAML flow text, keys in order, numbers shortest: for reports and content hashes. */
-struct rl_str;
+struct rl_str; /* graph/base/text.h */
 void rl_value_print(const rl_value *v, struct rl_str *out);
 
 /* ---- changing (value.c) ---- */

@@ -1,0 +1,37 @@
+/* Reading a pass's table of parameters from YAML, and telling about it. */
+#ifndef RL_MODEL_PARAMS_H
+#define RL_MODEL_PARAMS_H
+
+#include "graph/base/text.h"
+#include "graph/model/pass.h"
+#include "graph/model/value.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* The default of a row, written to out (RL_PARAM_BYTES(row->type) bytes). */
+void rl_param_default(const rl_param *row, void *out);
+
+/* One value: type and range checked in double before narrowing, NaN refused, words known with did-you-mean.
+ * `out` gets RL_PARAM_BYTES(row->type) bytes. */
+rl_code rl_param_read(const rl_param *row, const rl_value *v, void *out, rl_error *err);
+
+/* A pass's struct (pass->params_size bytes in the arena): defaults, then what the node's map says. Keys named in
+ * `also` (such as "pass" and "in") are skipped; any other unknown key is an error that reads
+ * "pass 'sss' (sss_burley) has no parameter 'tapps'; did you mean 'taps'? known: …". */
+rl_code rl_params_read(rl_arena *arena, const rl_pass *pass, const char *node, const rl_value *map,
+                       const char *const *also, size_t n_also, const void **out, rl_error *err);
+
+/* A value as YAML text ("auto", "screen", "0.05", "[1, 0, 0]"), appended to s. */
+void rl_param_print(const rl_param *row, const void *value, rl_str *s);
+/* The row's range and default for people: "0 … 1, default 0.05 ratio", "screen|tangent, default screen". */
+void rl_param_describe(const rl_param *row, rl_str *s);
+
+/* The OpenCL text of a struct with these rows, in order: "typedef struct params_t { float blend; } params_t;". */
+void rl_params_struct_text(rl_params params, const char *name, rl_str *s);
+
+#ifdef __cplusplus
+}
+#endif
+#endif
