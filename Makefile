@@ -21,7 +21,7 @@ LIB_CXX := $(wildcard graph/run/*.cc)
 MODULE_CXX := graph/run/shim_oiio.cc
 LIB_CXX := $(filter-out $(MODULE_CXX),$(LIB_CXX))
 TOOL_C  := $(wildcard graph/tool/*.c)
-LIB_O   := $(LIB_C:%.c=$(BUILD)/%.o) $(LIB_CXX:%.cc=$(BUILD)/%.o)
+LIB_O   := $(LIB_C:%.c=$(BUILD)/%.o) $(LIB_CXX:%.cc=$(BUILD)/%.o) $(BUILD)/kernels.o
 TOOL_O  := $(TOOL_C:%.c=$(BUILD)/%.o)
 LIBS    = $(shell pkg-config --libs $(PKGS)) $(shell pkg-config --libs OpenColorIO) -lOpenCL -lstdc++ -ldl -lm
 TESTS   := $(patsubst tests/%.c,$(BUILD)/tests/%,$(wildcard tests/test_*.c))
@@ -62,3 +62,18 @@ clean:
 	rm -rf $(BUILD)
 
 .PHONY: all test test-build format clean
+
+# Kernels are built into the library, so that it runs from anywhere; $RELIT_KERNELS overrides them.
+KERNELS := kernels/shared.h $(wildcard kernels/*.cl)
+$(BUILD)/kernels.c: $(KERNELS) Makefile
+	@mkdir -p $(@D)
+	@{ echo '/* generated from kernels/ */'; \
+	  n=0; for k in $(KERNELS); do echo "static const unsigned char k$$n[] = {"; \
+	    od -An -v -tu1 $$k | sed 's/  */,/g;s/^,//;s/$$/,/'; echo '0};'; n=$$((n+1)); done; \
+	  echo 'typedef struct embedded { const char *name; const unsigned char *text; } embedded;'; \
+	  echo 'extern const embedded rl_embedded_kernels[];'; \
+	  echo 'const embedded rl_embedded_kernels[] = {'; \
+	  n=0; for k in $(KERNELS); do echo "{\"$$(basename $$k)\", k$$n},"; n=$$((n+1)); done; \
+	  echo '{0, 0}};'; } > $@.tmp && mv $@.tmp $@
+$(BUILD)/kernels.o: $(BUILD)/kernels.c
+	$(CC) $(CPPFLAGS) $(CFLAGS) -c $< -o $@

@@ -17,9 +17,9 @@ void rl_param_default(const rl_param *row, void *out);
  * `out` gets RL_PARAM_BYTES(row->type) bytes. */
 rl_code rl_param_read(const rl_param *row, const rl_value *v, void *out, rl_error *err);
 
-/* A pass's struct (pass->params_size bytes in the arena): defaults, then what the node's map says. Keys named in
- * `also` (such as "pass" and "in") are skipped; any other unknown key is an error that reads
- * "pass 'sss' (sss_burley) has no parameter 'tapps'; did you mean 'taps'? known: …". */
+/* A pass's struct (pass->params_size bytes in the arena): defaults, then what the node's map says. Keys named
+ * in `also` (such as "pass" and "in") are skipped; any other unknown key is an error that reads "pass 'sss'
+ * (sss_burley) has no parameter 'tapps'; did you mean 'taps'? known: …". */
 rl_code rl_params_read(rl_arena *arena, const rl_pass *pass, const char *node, const rl_value *map,
                        const char *const *also, size_t n_also, const void **out, rl_error *err);
 
@@ -28,7 +28,8 @@ void rl_param_print(const rl_param *row, const void *value, rl_str *s);
 /* The row's range and default for people: "0 … 1, default 0.05 ratio", "screen|tangent, default screen". */
 void rl_param_describe(const rl_param *row, rl_str *s);
 
-/* The OpenCL text of a struct with these rows, in order: "typedef struct params_t { float blend; } params_t;". */
+/* The OpenCL text of a struct with these rows, in order: "typedef struct params_t { float blend; }
+ * params_t;". */
 void rl_params_struct_text(rl_params params, const char *name, rl_str *s);
 
 #ifdef __cplusplus

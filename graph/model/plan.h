@@ -1,5 +1,5 @@
-/* The plan: what runs, in which order, in which memory. Made from a graph alone: no OpenCL, no pixel, no size; the same
- * graph gives the same plan. Constant once made. */
+/* The plan: what runs, in which order, in which memory. Made from a graph alone: no OpenCL, no pixel, no
+ * size; the same graph gives the same plan. Constant once made. */
 #ifndef RL_MODEL_PLAN_H
 #define RL_MODEL_PLAN_H
 
@@ -30,13 +30,14 @@ typedef enum rl_buffer_class {
 
 /* A buffer: one image in one layout. */
 typedef struct rl_buffer {
-    int image;  /* of the graph, or -1: scratch of a node */
+    int image;        /* of the graph, or -1: scratch of a node */
     const char *name; /* the image's, or "sss.filtered" for a scratch port */
     rl_layout layout;
     int planes;
     rl_buffer_class kind;
     int slot;        /* TRANSIENT: the slot that it lives in; else -1 */
-    int first, last; /* steps, inclusive, during which it holds something; SOURCE: first = -1; SINK: last = n_steps */
+    int first, last; /* steps, inclusive, during which it holds something; SOURCE: first = -1; SINK: last =
+                        n_steps */
 } rl_buffer;
 
 typedef enum rl_step_kind {
@@ -47,8 +48,8 @@ typedef enum rl_step_kind {
 
 typedef struct rl_plan_step {
     rl_step_kind kind;
-    int node; /* KERNEL: of the graph; else -1 */
-    int step; /* KERNEL: index into the pass's steps */
+    int node;           /* KERNEL: of the graph; else -1 */
+    int step;           /* KERNEL: index into the pass's steps */
     const int *buffers; /* KERNEL: one a port, -1 = NULL; CONVERT and COPY: {source, destination} */
     int n_buffers;
 } rl_plan_step;
@@ -59,8 +60,8 @@ typedef struct rl_plan_node {
     const int *buffers; /* a port: the buffer, or -1 */
 } rl_plan_node;
 
-/* A HISTORY port's buffer in `buffers` is the pair's; the executor binds its older half. For the history of a capture
- * layer the pair's younger half is filled by a COPY step at the end of the plan. */
+/* A HISTORY port's buffer in `buffers` is the pair's; the executor binds its older half. For the history of a
+ * capture layer the pair's younger half is filled by a COPY step at the end of the plan. */
 typedef struct rl_plan {
     const rl_graph *graph;
     const rl_buffer *buffers;
@@ -71,8 +72,9 @@ typedef struct rl_plan {
     size_t n_nodes;
     const int *slot_planes; /* [n_slots]: planes of the largest buffer in the slot */
     size_t n_slots;
-    const int *const *outputs; /* [graph->n_outputs][n_images]: the buffer that the writer reads (SOURCE or SINK) */
-    const int *culled;         /* nodes that no output needs */
+    const int *const
+        *outputs;      /* [graph->n_outputs][n_images]: the buffer that the writer reads (SOURCE or SINK) */
+    const int *culled; /* nodes that no output needs */
     size_t n_culled;
 } rl_plan;
 
@@ -90,7 +92,8 @@ size_t rl_plan_bytes_unshared(const rl_plan *plan, const rl_geometry *g, int in_
 struct rl_str; /* graph/base/text.h */
 void rl_plan_print_text(const rl_plan *plan, const rl_geometry *g, int in_flight, struct rl_str *out);
 void rl_plan_print_dot(const rl_plan *plan, const rl_geometry *g, int in_flight, struct rl_str *out);
-rl_code rl_plan_print_json(const rl_plan *plan, const rl_geometry *g, int in_flight, struct rl_str *out, rl_error *err);
+rl_code rl_plan_print_json(const rl_plan *plan, const rl_geometry *g, int in_flight, struct rl_str *out,
+                           rl_error *err);
 
 #ifdef __cplusplus
 }
