@@ -87,45 +87,44 @@ static int find_image(const rl_graph_builder *b, const char *name)
     return -1;
 }
 
-/* The node that `name` starts with ("sss" of "sss.color"), -1 for the capture, -2 for neither. */
+enum { THE_CAPTURE = -1, NO_GROUP = -2 };
+
+/* The node that `name` starts with: "sss" of "sss.color". */
 static int find_group(const rl_graph_builder *b, const char *name, size_t length)
 {
     if (length == strlen(CAPTURE) && !strncmp(name, CAPTURE, length))
-        return -1;
+        return THE_CAPTURE;
     for (size_t i = 0; i < b->n_nodes; i++)
         if (strlen(b->nodes[i].name) == length && !strncmp(b->nodes[i].name, name, length))
             return (int)i;
-    return -2;
+    return NO_GROUP;
 }
 
 static rl_code fail_image(rl_graph_builder *b, const char *name, rl_where where, const char *user)
 {
-    const char *dot = strchr(name, '.');
-    size_t length = dot ? (size_t)(dot - name) : strlen(name);
-    int group = find_group(b, name, length);
-    const char *prefix = rl_arena_strndup(b->arena, name, length), *head = NULL;
+    const char *dot = strchr(name, '.'), *leaf = dot ? dot + 1 : "", *head, *what = "its images";
+    const size_t length = dot ? (size_t)(dot - name) : strlen(name);
+    const int group = find_group(b, name, length);
+    const char *prefix = rl_arena_strndup(b->arena, name, length);
     names known = {0};
-    rl_code code = group == -2 ? names_of_groups(b, &known) : names_of_images(b, group, &known);
-    if (code != RL_OK)
-        return code;
-    if (group == -2)
+    rl_code code = group == NO_GROUP ? names_of_groups(b, &known) : names_of_images(b, group, &known);
+    if (code != RL_OK || !prefix)
+        return code != RL_OK ? code : rl_fail_memory(b->err, length);
+    if (group == NO_GROUP) {
         head = rl_arena_printf(b->arena, "%s: no image '%s': the graph has no pass '%s'", user, name, prefix);
-    else if (group == -1)
-        head = rl_arena_printf(b->arena, "%s: no image '%s': the capture has no layer '%s'", user, name,
-                               dot ? dot + 1 : "");
-    else
+        what = "known";
+        leaf = prefix;
+    } else if (!dot) {
+        head = rl_arena_printf(b->arena, "%s: no image '%s': write '%s.IMAGE'", user, name, name);
+    } else if (group == THE_CAPTURE) {
+        head =
+            rl_arena_printf(b->arena, "%s: no image '%s': the capture has no layer '%s'", user, name, leaf);
+        what = "its layers";
+    } else {
         head = rl_arena_printf(b->arena, "%s: no image '%s': pass '%s' (%s) does not write '%s'", user, name,
-                               prefix, b->nodes[group].pass->name, dot ? dot + 1 : "");
-    if (!head || !prefix)
-        return rl_fail_memory(b->err, strlen(name));
-    return fail_unknown(b, where, head,
-                        group == -2 ? prefix
-                        : dot       ? dot + 1
-                                    : "",
-                        known,
-                        group == -2   ? "known"
-                        : group == -1 ? "its layers"
-                                      : "its images");
+                               prefix, b->nodes[group].pass->name, leaf);
+    }
+    return head ? fail_unknown(b, where, head, leaf, known, what) : rl_fail_memory(b->err, strlen(name));
 }
 
 rl_code rl_graph_resolve(rl_graph_builder *b, const char *name, rl_where where, const char *user, int *out)
