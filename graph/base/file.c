@@ -22,7 +22,8 @@ static rl_code read_all(int fd, const char *path, char **data, size_t *size, rl_
         return io_error(err, path, "cannot be read");
     if (S_ISDIR(st.st_mode))
         return rl_fail_file(err, RL_E_IO, path, "cannot be read: it is a folder");
-    size_t room = st.st_size > 0 ? (size_t)st.st_size : 4096, used = 0;
+    size_t room = st.st_size > 0 ? (size_t)st.st_size + 1 : 4096,
+           used = 0; /* + 1: the read that finds the end */
     char *text = rl_malloc(room + 1);
     rl_code code = RL_OK;
     while (text) {
