@@ -75,7 +75,7 @@ static rl_code measure(const rl_ocio_transform *transform, const float *rgb, dou
     unsigned state = 1;
     for (int i = 0; i < 3 * TRIALS; i++)
         in[i] = want[i] = random_value(&state);
-    rl_code code = rl_ocio_apply(transform, false, want, want + TRIALS, want + 2 * TRIALS, TRIALS, err);
+    rl_code code = rl_ocio_apply(transform, want, want + TRIALS, want + 2 * TRIALS, TRIALS, err);
     *error = 0;
     for (int i = 0; code == RL_OK && i < TRIALS; i++) {
         double got[3];
@@ -93,7 +93,7 @@ rl_code rl_color_bake(const rl_ocio_transform *transform, rl_color_text *text, d
     if (!planes)
         return rl_fail_memory(err, 6 * CELLS * sizeof *planes);
     fill_cube(planes);
-    rl_code code = rl_ocio_apply(transform, false, planes, planes + CELLS, planes + 2 * CELLS, CELLS, err);
+    rl_code code = rl_ocio_apply(transform, planes, planes + CELLS, planes + 2 * CELLS, CELLS, err);
     if (code != RL_OK)
         goto done;
     for (int i = 0; i < 3 * CELLS; i++)

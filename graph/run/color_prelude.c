@@ -90,6 +90,7 @@ const char *const rl_color_prelude[] = {
     "    return (middle - low) / max(r - low, 1e-10f) * (to - low) + low;\n"
     "}\n"
     "\n"
+    ,
     "/* What the glow multiplies colours by, minus 1. */\n"
     "static inline floatv rl_c_glow(floatv r, floatv g, floatv b, float gain, float mid, int inverse)\n"
     "{\n"
@@ -112,6 +113,7 @@ const char *const rl_color_prelude[] = {
     "    return rl_c_power(max(y, least), K(exponent));\n"
     "}\n"
     "\n"
+    ,
     "/* One channel of the ACES 1.3 gamut compression, and back. */\n"
     "static inline floatv rl_c_gamut(floatv v, floatv ach, float threshold, float scale, float power, int inverse)\n"
     "{\n"

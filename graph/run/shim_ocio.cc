@@ -16,9 +16,8 @@ struct rl_ocio {
 };
 
 struct rl_ocio_transform {
-    OCIO::ConstConfigRcPtr config;
     OCIO::ConstProcessorRcPtr processor; /* optimized */
-    OCIO::ConstCPUProcessorRcPtr cpu_exact, cpu_fast;
+    OCIO::ConstCPUProcessorRcPtr cpu;
 };
 
 /* Optimizations that change no value: without tables for inverses and fast log, exp and pow. */
@@ -195,13 +194,11 @@ extern "C" rl_code rl_ocio_transform_new(const rl_ocio *ocio, const rl_ocio_requ
     rl_code code = RL_OK;
     try {
         OCIO::ConstProcessorRcPtr whole = make_processor(*ocio->config, request);
-        transform->config = ocio->config;
         /* Inverses of tables become tables, everything else stays exact. */
         transform->processor = whole->getOptimizedProcessor(
             OCIO::OptimizationFlags(EXACT | OCIO::OPTIMIZATION_LUT_INV_FAST | OCIO::OPTIMIZATION_COMP_LUT1D |
                                     OCIO::OPTIMIZATION_NO_DYNAMIC_PROPERTIES));
-        transform->cpu_exact = transform->processor->getOptimizedCPUProcessor(EXACT);
-        transform->cpu_fast = whole->getOptimizedCPUProcessor(OCIO::OPTIMIZATION_DEFAULT);
+        transform->cpu = transform->processor->getOptimizedCPUProcessor(EXACT);
     } catch (...) {
         code = rl_shim_caught(err);
     }
@@ -216,14 +213,14 @@ extern "C" void rl_ocio_transform_free(rl_ocio_transform **transform)
     destroy(transform);
 }
 
-extern "C" rl_code rl_ocio_apply(const rl_ocio_transform *transform, bool fast, float *r, float *g, float *b,
-                                 size_t n, rl_error *err)
+extern "C" rl_code rl_ocio_apply(const rl_ocio_transform *transform, float *r, float *g, float *b, size_t n,
+                                 rl_error *err)
 {
     if (n == 0)
         return RL_OK;
     try {
         OCIO::PlanarImageDesc image(r, g, b, nullptr, long(n), 1);
-        (fast ? transform->cpu_fast : transform->cpu_exact)->apply(image);
+        transform->cpu->apply(image);
         return RL_OK;
     } catch (...) {
         return rl_shim_caught(err);
@@ -250,7 +247,7 @@ extern "C" rl_code rl_ocio_ops(const rl_ocio_transform *transform, rl_arena *are
     *ops = nullptr;
     *n = 0;
     try {
-        return rl_shim_ops(*transform->config, *transform->processor->createGroupTransform(), arena, ops, n, err);
+        return rl_shim_ops(*transform->processor->createGroupTransform(), arena, ops, n, err);
     } catch (...) {
         return rl_shim_caught(err);
     }

@@ -63,9 +63,8 @@ rl_code rl_ocio_transform_new(const rl_ocio *ocio, const rl_ocio_request *reques
                               rl_error *err);
 void rl_ocio_transform_free(rl_ocio_transform **transform);
 
-/* Applies it in place to n pixels of three planes. `fast` takes OpenColorIO's default approximations of log, exp
- * and pow (what its users get), otherwise those of the C library. */
-rl_code rl_ocio_apply(const rl_ocio_transform *transform, bool fast, float *r, float *g, float *b, size_t n,
+/* Applies it on the CPU, in place, to n pixels of three planes, with exact log, exp and pow. */
+rl_code rl_ocio_apply(const rl_ocio_transform *transform, float *r, float *g, float *b, size_t n,
                       rl_error *err);
 
 /* OpenColorIO's own text for a GPU (GLSL 4.0), for a reader; in the arena. */

@@ -6,12 +6,6 @@
 
 namespace OCIO = OCIO_NAMESPACE;
 
-/* Where an operation is described: the arena for its arrays, the config for the one question below. */
-struct reader {
-    const OCIO::Config &config;
-    rl_arena *arena;
-};
-
 static void first3(const double *from, double *to)
 {
     memcpy(to, from, 3 * sizeof *to);
@@ -157,18 +151,19 @@ static bool copy_spline(rl_arena *arena, const uniforms &from, int curve, rl_op_
     return true;
 }
 
-static void read_curves(const reader &in, const OCIO::GradingRGBCurveTransform &t, rl_op *op)
+static void read_curves(rl_arena *arena, const OCIO::GradingRGBCurveTransform &t, rl_op *op)
 {
     OCIO::TransformRcPtr copy = t.createEditableCopy();
     auto curves = OCIO::DynamicPtrCast<OCIO::GradingRGBCurveTransform>(copy);
     curves->makeDynamic();
     OCIO::GpuShaderDescRcPtr desc = OCIO::GpuShaderDesc::CreateShaderDesc();
-    in.config.getProcessor(curves)->getOptimizedGPUProcessor(OCIO::OPTIMIZATION_NONE)->extractGpuShaderInfo(desc);
+    /* A config of its own: a shared one caches processors, and takes dynamic curves for equal. */
+    OCIO::Config::CreateRaw()->getProcessor(curves)->getOptimizedGPUProcessor(OCIO::OPTIMIZATION_NONE)->extractGpuShaderInfo(desc);
     uniforms found = find_uniforms(*desc);
     if (!found.knot_offsets || !found.piece_offsets || !found.knots || !found.pieces)
         return;
     for (int c = 0; c < 4; c++)
-        if (!copy_spline(in.arena, found, c, &op->u.curves.spline[c]))
+        if (!copy_spline(arena, found, c, &op->u.curves.spline[c]))
             return;
     op->u.curves.lin = t.getStyle() == OCIO::GRADING_LIN && !t.getBypassLinToLog();
     op->kind = RL_OP_CURVES;
@@ -253,10 +248,10 @@ static void read_contrast(const OCIO::ExposureContrastTransform &t, rl_op *op)
     op->kind = RL_OP_CONTRAST;
 }
 
-static bool read_lut1d(const reader &in, const OCIO::Lut1DTransform &t, rl_op *op)
+static bool read_lut1d(rl_arena *arena, const OCIO::Lut1DTransform &t, rl_op *op)
 {
     size_t n = t.getLength();
-    auto rgb = static_cast<float *>(rl_arena_array(in.arena, 3 * n, sizeof(float)));
+    auto rgb = static_cast<float *>(rl_arena_array(arena, 3 * n, sizeof(float)));
     if (!rgb)
         return false;
     for (size_t i = 0; i < n; i++)
@@ -269,10 +264,10 @@ static bool read_lut1d(const reader &in, const OCIO::Lut1DTransform &t, rl_op *o
     return true;
 }
 
-static bool read_lut3d(const reader &in, const OCIO::Lut3DTransform &t, rl_op *op)
+static bool read_lut3d(rl_arena *arena, const OCIO::Lut3DTransform &t, rl_op *op)
 {
     size_t n = t.getGridSize();
-    auto rgb = static_cast<float *>(rl_arena_array(in.arena, 3 * n * n * n, sizeof(float)));
+    auto rgb = static_cast<float *>(rl_arena_array(arena, 3 * n * n * n, sizeof(float)));
     if (!rgb)
         return false;
     for (size_t i = 0; i < n * n * n; i++)
@@ -291,7 +286,7 @@ template <typename T> static const T &as(const OCIO::Transform &t)
 }
 
 /* False when memory is out. What cannot be described stays RL_OP_OTHER. */
-static bool read_op(const reader &in, const OCIO::Transform &t, rl_op *op)
+static bool read_op(rl_arena *arena, const OCIO::Transform &t, rl_op *op)
 {
     static const char *const names[] = {
         "allocation", "built-in",      "CDL",           "colour space",      "display view",
@@ -309,7 +304,7 @@ static bool read_op(const reader &in, const OCIO::Transform &t, rl_op *op)
     case OCIO::TRANSFORM_TYPE_LOG_AFFINE: read_log_sides(as<OCIO::LogAffineTransform>(t), op); break;
     case OCIO::TRANSFORM_TYPE_LOG_CAMERA: read_log_camera(as<OCIO::LogCameraTransform>(t), op); break;
     case OCIO::TRANSFORM_TYPE_GRADING_RGB_CURVE:
-        read_curves(in, as<OCIO::GradingRGBCurveTransform>(t), op);
+        read_curves(arena, as<OCIO::GradingRGBCurveTransform>(t), op);
         break;
     case OCIO::TRANSFORM_TYPE_FIXED_FUNCTION: read_fixed(as<OCIO::FixedFunctionTransform>(t), op); break;
     case OCIO::TRANSFORM_TYPE_EXPONENT: read_power(as<OCIO::ExponentTransform>(t), op); break;
@@ -320,23 +315,22 @@ static bool read_op(const reader &in, const OCIO::Transform &t, rl_op *op)
     case OCIO::TRANSFORM_TYPE_EXPOSURE_CONTRAST:
         read_contrast(as<OCIO::ExposureContrastTransform>(t), op);
         break;
-    case OCIO::TRANSFORM_TYPE_LUT1D: return read_lut1d(in, as<OCIO::Lut1DTransform>(t), op);
-    case OCIO::TRANSFORM_TYPE_LUT3D: return read_lut3d(in, as<OCIO::Lut3DTransform>(t), op);
+    case OCIO::TRANSFORM_TYPE_LUT1D: return read_lut1d(arena, as<OCIO::Lut1DTransform>(t), op);
+    case OCIO::TRANSFORM_TYPE_LUT3D: return read_lut3d(arena, as<OCIO::Lut3DTransform>(t), op);
     default: break;
     }
     return true;
 }
 
-rl_code rl_shim_ops(const OCIO::Config &config, const OCIO::GroupTransform &group, rl_arena *arena, rl_op **ops,
+rl_code rl_shim_ops(const OCIO::GroupTransform &group, rl_arena *arena, rl_op **ops,
                     size_t *n, rl_error *err)
 {
-    reader in = {config, arena};
     int count = group.getNumTransforms();
     auto list = static_cast<rl_op *>(rl_arena_array(arena, size_t(count) + 1, sizeof(rl_op)));
     if (!list)
         return rl_fail_memory(err, size_t(count) * sizeof(rl_op));
     for (int i = 0; i < count; i++)
-        if (!read_op(in, *group.getTransform(i), &list[i]))
+        if (!read_op(arena, *group.getTransform(i), &list[i]))
             return rl_fail_memory(err, 0);
     *ops = list;
     *n = size_t(count);

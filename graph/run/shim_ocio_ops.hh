@@ -6,9 +6,8 @@
 
 #include "graph/run/shim_ocio.h"
 
-/* May throw; `config` is only asked for processors of single operations. */
-rl_code rl_shim_ops(const OCIO_NAMESPACE::Config &config, const OCIO_NAMESPACE::GroupTransform &group,
-                    rl_arena *arena, rl_op **ops, size_t *n, rl_error *err);
+/* May throw. */
+rl_code rl_shim_ops(const OCIO_NAMESPACE::GroupTransform &group, rl_arena *arena, rl_op **ops, size_t *n, rl_error *err);
 
 /* Inside a catch block: the exception as an error. */
 rl_code rl_shim_caught(rl_error *err);
