@@ -50,9 +50,9 @@ static double end_slope(const rl_op_spline *s)
     return 2 * s->a[last] * ((double)s->knots[s->n - 1] - s->knots[last]) + s->b[last];
 }
 
-/* A smooth quadratic spline is one parabola plus a multiple of max(x - knot, 0)² for every knot to its right and
- * min(x - knot, 0)² for every knot to its left. Three operations and a fused add a knot, no comparison and no
- * table. The parabola is the middle piece's: the sums then cancel least. */
+/* A smooth quadratic spline is one parabola plus a multiple d of max(x - knot, 0)² for every knot to its right and of
+ * min(x - knot, 0)² for every knot to its left. With √|d| inside of the square that is three operations a knot, no
+ * comparison and no table. The parabola is the middle piece's: the sums then cancel least. */
 static void emit_smooth(rl_color_text *t, const rl_op_spline *s, char c)
 {
     size_t mid = (s->n - 2) / 2;
@@ -62,9 +62,10 @@ static void emit_smooth(rl_color_text *t, const rl_op_spline *s, char c)
                   RL_LIT(s->knots[mid]), RL_LIT(s->a[mid]), RL_LIT(s->b[mid]), RL_LIT(s->c[mid]));
     for (size_t i = 1; i + 1 < s->n; i++) {
         double change = i > mid ? (double)s->a[i] - s->a[i - 1] : (double)s->a[i - 1] - s->a[i];
+        double root = sqrt(fabs(change));
         if (change != 0)
-            rl_str_printf(&t->body, "        u = %s(x - %s, 0.0f), y = fma(u * %s, u, y);\n", i > mid ? "max" : "min",
-                          RL_LIT(s->knots[i]), RL_LIT(change));
+            rl_str_printf(&t->body, "        u = %s(fma(x, K(%s), K(%s)), 0.0f), y = fma(%su, u, y);\n",
+                          i > mid ? "max" : "min", RL_LIT(root), RL_LIT(-root * s->knots[i]), change < 0 ? "-" : "");
     }
     if (s->b[0] != 0)
         rl_str_printf(&t->body, "        y = fma(min(%c - %s, 0.0f), K(%s), y);\n", c, RL_LIT(first), RL_LIT(s->b[0]));
