@@ -130,6 +130,7 @@ typedef struct rl_step {
 
 /* What the host-side hook of a pass may read. */
 typedef struct rl_pass_input {
+    const struct rl_pass *pass;            /* the pass itself, for its .data */
     const void *params;                    /* the pass's struct */
     const struct rl_materials *materials;  /* resolved; read with rl_material_* below */
 } rl_pass_input;
@@ -160,6 +161,7 @@ typedef struct rl_pass {
     bool lights; /* the kernel gets the lights, and the run the shadow layers that they use */
     /* Computes constant tables from parameters and materials, in double, into `arena`; NULL = none. Pure. */
     rl_code (*tables)(const rl_pass_input *in, rl_arena *arena, rl_tables *out, rl_error *err);
+    const void *data; /* for .tables of a pass that is built at run time; the engine does not look at it */
 } rl_pass;
 
 /* The struct holds the table's 4-byte fields and nothing else; RGB rows count three. */
