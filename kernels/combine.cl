@@ -18,7 +18,7 @@ static inline floatv normal_view(constant frame_t *f, global const float *normal
         nw = fma(rl_load(normal, at + i * f->plane), w, nw);
         ww = fma(w, w, ww);
     }
-    return -nw * rl_rsqrt(ww);
+    return -nw * rsqrt(ww);
 }
 
 kernel void combine(global const float *diffuse, global const float *lit, global const float *albedo,
@@ -43,7 +43,7 @@ kernel void combine(global const float *diffuse, global const float *lit, global
             f_out = exit_transmission(normal_view(f, normal, x, y));
         for (int c = 0; c < 3; c++) {
             floatv a = rl_load(albedo, at + c * f->plane);
-            floatv leaves = m->profile_texturing == 0 ? a : rl_sqrt(a); /* post; pre_post */
+            floatv leaves = m->profile_texturing == 0 ? a : sqrt(a); /* post; pre_post */
             floatv d = rl_load(diffuse, at + c * f->plane) * leaves * f_out;
             out[c] += rl_select(0.0f, d, mask);
         }

@@ -222,24 +222,6 @@ static inline floatv rl_exp2(floatv x)
     return select(y, (floatv)0.0f, under);
 }
 
-/* 1/sqrt(x) for normal x > 0; relative error below 2e-7 (tests/test_kernel_math.c). 0 gives a large finite number, so
- * that x * rl_rsqrt(x) is a square root. Lomont's constant, three Newton steps, the last one with its residual in one
- * rounding. */
-static inline floatv rl_rsqrt(floatv x)
-{
-    floatv y = rl_as_floatv(0x5f375a86 - (rl_as_intv(x) >> 1));
-    floatv half_x = 0.5f * x;
-    y = y * fma(-half_x * y, y, 1.5f);
-    y = y * fma(-half_x * y, y, 1.5f);
-    floatv r = fma(-half_x * y, y, 0.5f);
-    return fma(y, r, y);
-}
-
-static inline floatv rl_sqrt(floatv x)
-{
-    return x * rl_rsqrt(x);
-}
-
 /* A hash of four words (PCG style): the only source of randomness in kernels. */
 static inline uint rl_hash(uint a, uint b, uint c, uint d)
 {

@@ -66,7 +66,7 @@ static inline void view_surface(surface_t *s, constant frame_t *f, int x, int y)
         nw = s->wide_n[i] * w + nw;
     }
     s->nw = nw * to_widev(s->z);
-    floatv inverse = rl_rsqrt(dot3(s->w, s->w));
+    floatv inverse = rsqrt(dot3(s->w, s->w));
     for (int i = 0; i < 3; i++)
         s->v[i] = -s->w[i] * inverse;
     s->nv = to_narrow(-nw) * inverse;
@@ -99,7 +99,7 @@ static inline void aim(ray_t *r, const surface_t *s, constant light_t *light, co
         r->l[i] = fma(-s->z, s->w[i], (floatv)(float)from_camera);
         nl = s->wide_n[i] * from_camera + nl;
     }
-    floatv inverse = rl_rsqrt(fmax(dot3(r->l, r->l), 1e-12f)); /* a light on the surface stays finite */
+    floatv inverse = rsqrt(fmax(dot3(r->l, r->l), 1e-12f)); /* a light on the surface stays finite */
     for (int i = 0; i < 3; i++)
         r->l[i] *= inverse;
     r->nl = to_narrow(nl) * inverse;
@@ -115,14 +115,14 @@ static inline floatv lobe(const surface_t *s, const ray_t *r, floatv roughness, 
     floatv alpha = fmax(roughness * roughness, ALPHA_MIN), a2 = alpha * alpha;
     floatv nl = fmax(r->nl, 0.0f), nv = fmax(s->nv, 0.0f);
     floatv h[3] = {r->l[0] + s->v[0], r->l[1] + s->v[1], r->l[2] + s->v[2]};
-    floatv hh = fmax(dot3(h, h), 1e-12f), inverse = rl_rsqrt(hh);
+    floatv hh = fmax(dot3(h, h), 1e-12f), inverse = rsqrt(hh);
     floatv nh = fmax(r->nl + s->nv, 0.0f) * inverse;
     floatv cross[3] = {s->n[1] * h[2] - s->n[2] * h[1], s->n[2] * h[0] - s->n[0] * h[2],
                        s->n[0] * h[1] - s->n[1] * h[0]};
     floatv sine = dot3(cross, cross) * inverse * inverse;
     floatv denominator = fma(a2 * nh, nh, sine);
     floatv f = fmax(1.0f - 0.5f * hh * inverse, 0.0f), f2 = f * f;
-    floatv smith = nl * rl_sqrt(fma(nv * nv, 1.0f - a2, a2)) + nv * rl_sqrt(fma(nl * nl, 1.0f - a2, a2));
+    floatv smith = nl * sqrt(fma(nv * nv, 1.0f - a2, a2)) + nv * sqrt(fma(nl * nl, 1.0f - a2, a2));
     *fresnel = f2 * f2 * f;
     return a2 * (0.5f / RL_PI) / (denominator * denominator * fmax(smith, 1e-12f));
 }
@@ -220,7 +220,7 @@ static inline void shade(constant material_t *m, surface_t *s, constant frame_t 
         if (!m->has_profile)
             lit[c] = fma(sum[c] * scale, s->albedo[c], lit[c]);
         else
-            diffuse[c] = sum[c] * scale * (m->profile_texturing == PRE_POST ? rl_sqrt(s->albedo[c]) : 1.0f);
+            diffuse[c] = sum[c] * scale * (m->profile_texturing == PRE_POST ? sqrt(s->albedo[c]) : 1.0f);
     }
 }
 

@@ -1,5 +1,5 @@
-/* No scattering: what entered leaves at the same place. The "SSS off" half of an A/B test; at a distance it equals
- * every subsurface filter (Golubev 2018). */
+/* No scattering: what entered leaves at the same place. The "SSS off" half of an A/B test; at a distance it
+ * equals every subsurface filter (Golubev 2018). */
 #include "passes/shading_rows.h"
 
 static const rl_param profile_keys[] = {RL_ROW_TEXTURING};

@@ -1,8 +1,8 @@
-/* Direct light on the G-buffer: point, spot and directional lights, Lambert's or Disney's diffuse transmission, GGX
- * specular, translucency through a slab.
+/* Direct light on the G-buffer: point, spot and directional lights, Lambert's or Disney's diffuse
+ * transmission, GGX specular, translucency through a slab.
  *
- * Golubev 2018 (transmission at entry and exit, texturing modes, thin and thick slabs), Helix (Beer-Lambert), Walter
- * 2007 and Heitz 2014 (GGX, height-correlated Smith), Schlick 1994 (Fresnel). */
+ * Golubev 2018 (transmission at entry and exit, texturing modes, thin and thick slabs), Helix (Beer-Lambert),
+ * Walter 2007 and Heitz 2014 (GGX, height-correlated Smith), Schlick 1994 (Fresnel). */
 #include "passes/shading_rows.h"
 
 static const rl_param profile_keys[] = {
@@ -20,9 +20,10 @@ static const rl_param profile_keys[] = {
 
 static const rl_param material_keys[] = {
     M(RL_F32, roughness, 0, 1, -1, "ratio",
-      "perceptual roughness, alpha is its square; not given: the roughness layer, else 0.5", .no_default = true),
-    M(RL_F32, specular, 0, 1, -1, "ratio", "reflectance at normal incidence; not given: the specular layer, else 0.04",
+      "perceptual roughness, alpha is its square; not given: the roughness layer, else 0.5",
       .no_default = true),
+    M(RL_F32, specular, 0, 1, -1, "ratio",
+      "reflectance at normal incidence; not given: the specular layer, else 0.04", .no_default = true),
     M(RL_F32, metallic, 0, 1, -1, "ratio",
       "1: albedo is the specular colour and nothing is diffuse; not given: the metallic layer, else 0",
       .no_default = true),
@@ -31,12 +32,7 @@ static const rl_param material_keys[] = {
 static const rl_param shading_keys[] = {
     RL_ROW_DIFFUSE,
     M_ENUM(specular, "ggx|none", 0, "the specular lobe", .source = "Walter 2007, Heitz 2014"),
-    {.name = "transmission",
-     .type = RL_BOOL,
-     .max = 1,
-     .def = {1, 1, 1},
-     .unit = "",
-     .help = "false switches off the transmission that profiles ask for"},
+    M(RL_BOOL, transmission, 0, 1, 1, "", "false switches off the transmission that profiles ask for"),
     RL_ROW_EXIT_TRANSMISSION,
 };
 
@@ -45,9 +41,11 @@ static const rl_port ports[] = {
     {"normal", RL_READ, RL_NORMAL, .help = "shading normal"},
     {"depth", RL_READ, RL_SCALAR, .help = "planar, metres"},
     {"stencil", RL_READ, RL_ID, .help = "material"},
-    {"thickness", RL_READ, RL_SCALAR, .help = "metres along the inward normal, 0 = unknown", .optional = true},
+    {"thickness", RL_READ, RL_SCALAR, .help = "metres along the inward normal, 0 = unknown",
+     .optional = true},
     {"shadow", RL_READ, RL_LIGHTS, .help = "visibility of each light, 0 to 1", .optional = true},
-    {"shadow_thickness", RL_READ, RL_LIGHTS, .help = "metres along the light's ray, 0 where lit", .optional = true},
+    {"shadow_thickness", RL_READ, RL_LIGHTS, .help = "metres along the light's ray, 0 where lit",
+     .optional = true},
     {"roughness", RL_READ, RL_SCALAR, .help = "perceptual, 0 to 1", .optional = true},
     {"specular", RL_READ, RL_SCALAR, .help = "reflectance at normal incidence, 0 to 1", .optional = true},
     {"metallic", RL_READ, RL_SCALAR, .help = "0 to 1", .optional = true},
