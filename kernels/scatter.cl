@@ -50,27 +50,39 @@ static inline floatv scatter_keep(floatv v, intv mask)
 }
 
 #if RL_W == 16
+static inline int8 scatter_max8(intv v)
+{
+    return max(v.lo, v.hi);
+}
+
+static inline int8 scatter_or8(intv v)
+{
+    return v.lo | v.hi;
+}
+#elif RL_W == 8
+#define scatter_max8(v) (v)
+#define scatter_or8(v)  (v)
+#else
+#define scatter_max8(v) ((int8)((v), (v)))
+#define scatter_or8(v)  ((int8)((v), (v)))
+#endif
+
 static inline int scatter_max_int(intv v)
 {
-    int8 a = max(v.lo, v.hi);
+    int8 a = scatter_max8(v);
     int4 b = max(a.lo, a.hi);
     int2 c = max(b.lo, b.hi);
     return max(c.x, c.y);
 }
-#elif RL_W == 8
-static inline int scatter_max_int(intv v)
+
+/* any() by halves: PoCL tests lane after lane. */
+static inline int scatter_any(intv mask)
 {
-    int4 b = max(v.lo, v.hi);
-    int2 c = max(b.lo, b.hi);
-    return max(c.x, c.y);
+    int8 a = scatter_or8(mask);
+    int4 b = a.lo | a.hi;
+    long2 c = as_long2(b);
+    return (c.x | c.y) != 0;
 }
-#else
-static inline int scatter_max_int(intv v)
-{
-    int2 c = max(v.lo, v.hi);
-    return max(c.x, c.y);
-}
-#endif
 
 /* The largest positive float of the lanes in the mask, 0 when there is none: as bits, positive floats sort like
  * integers. */
@@ -149,7 +161,7 @@ static inline void scatter_resolve(global const float *filtered, global const fl
     int at = rl_index(f, x, y);
     intv id = rl_as_intv(rl_load4((global const float *)stencil, f, x, y));
     intv pre_post = 0, disney = 0, scatters = 0, left = id != 0;
-    while (any(left)) {
+    while (scatter_any(left)) {
         int m = scatter_max_int(id & left);
         intv mine = id == m;
         left &= ~mine;
@@ -161,11 +173,11 @@ static inline void scatter_resolve(global const float *filtered, global const fl
         disney |= mat->shading_diffuse == DIFFUSE_DISNEY && mat->shading_exit_transmission == EXIT_SSS ? mine : 0;
     }
     floatv out = 1.0f;
-    if (any(disney))
+    if (scatter_any(disney))
         out = rl_select(out, scatter_disney(scatter_n_dot_v(f, normal, x, y)), disney);
     for (int c = 0; c < 3; c++) {
         floatv sum = rl_load(lit + c * f->plane, at);
-        if (any(scatters)) {
+        if (scatter_any(scatters)) {
             floatv a = rl_load(albedo + c * f->plane, at);
             a = rl_select(a, sqrt(a), pre_post);
             floatv v = rl_load4(filtered + c * f->plane4, f, x, y) * a * out;

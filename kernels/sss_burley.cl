@@ -70,14 +70,14 @@ static inline floatv weight_exp2(floatv x)
     return rl_as_floatv(rl_as_intv(p) + (rl_as_intv(r) << 23)); /* magic's own low bits are 0 */
 }
 
-/* Taps first…first+TAP_BLOCK-1: index of the vector, radius² in units of d, weight. */
-static inline void place_taps(const inputs_t *in, const group_t *g, constant float *taps, int stride, int first,
+/* Taps first…first+n-1, n <= TAP_BLOCK: index of the vector, radius² in units of d, weight. */
+static inline void place_taps(const inputs_t *in, const group_t *g, constant float *taps, int stride, int first, int n,
                               int *at, float *r2, float *weight)
 {
     const float magic = 12582912.0f;
     constant frame_t *f = in->f;
     int rows4 = f->rows >> 2;
-    for (int i = 0; i < TAP_BLOCK; i += RL_W) {
+    for (int i = 0; i < n; i += RL_W) {
         floatv x = rl_vload(0, taps + first + i), y = rl_vload(0, taps + stride + first + i);
         floatv u = fma(x, (floatv)g->turn[0], -(y * g->turn[1])), v = fma(x, (floatv)g->turn[1], y * g->turn[0]);
         intv dx = rl_as_intv(fma(u, (floatv)g->k[0], (floatv)magic)) - as_int(magic);
@@ -103,8 +103,8 @@ static inline void sum_taps(const inputs_t *in, const group_t *g, constant float
     float r2[TAP_BLOCK], weight[TAP_BLOCK];
     AREA(floatv here = rl_vload(0, in->area + g->v.at);)
     for (int first = 0; first < n; first += TAP_BLOCK) {
-        place_taps(in, g, taps, stride, first, at, r2, weight);
         int last = min(TAP_BLOCK, n - first);
+        place_taps(in, g, taps, stride, first, last, at, r2, weight);
         for (int i = 0; i < last; i++) {
             int a = at[i];
             intv same = rl_as_intv(rl_vload(0, in->stencil + a)) == g->material;
@@ -147,12 +147,12 @@ static inline void filter_group(const inputs_t *in, const group_t *g, constant p
         float focal = fmax(in->f->camera.focal[0], in->f->camera.focal[1]);
         floatv rho = BURLEY_RADIUS * focal / (g->inv_d * g->z);
         floatv some = beyond(rho, LOD_SOME), many = beyond(rho, LOD_MANY);
-        if (!any(now & (some > 0.0f)))
+        if (!scatter_any(now & (some > 0.0f)))
             return;
         floatv fine[3] = {out[0], out[1], out[2]};
-        if (any(now & (many < 1.0f)))
+        if (scatter_any(now & (many < 1.0f)))
             sum_taps(in, g, taps, TAPS_SOME, sum);
-        if (any(now & (many > 0.0f)))
+        if (scatter_any(now & (many > 0.0f)))
             sum_taps(in, g, taps + 3 * TAP_BLOCK, TAPS_MANY, fine);
         for (int c = 0; c < 3; c++) {
             sum[c] = fma(many, fine[c] - sum[c], sum[c]);
@@ -179,10 +179,10 @@ static inline void filter_material(const inputs_t *in, const vector_t *v, consta
     g.turn[1] = in->tables[TABLE_TURNS + 2 * turn + 1];
     g.material = material;
     g.keep = mat->profile_border == BORDER_OCCLUDE ? -1 : 0;
-    while (any(mine)) { /* once as a rule, more at silhouettes */
+    while (scatter_any(mine)) { /* once as a rule, more at silhouettes */
         float far = scatter_farthest(g.z, mine);
         intv now = mine & (g.z >= NEAR * far);
-        now = any(now) ? now : mine;
+        now = scatter_any(now) ? now : mine;
         mine &= ~now;
         float middle = 0.5f * (far + scatter_nearest(g.z, now));
         floatv s = g.z / middle;
@@ -201,12 +201,12 @@ kernel void sss_burley_filter(global const float *diffuse, global const float *l
     inputs_t in = {diffuse, depth, area, stencil, tables, f};
     vector_t v = scatter_vector(f);
     intv id = rl_as_intv(rl_vload(0, stencil + v.at)), left = id != 0;
-    if (!any(left))
+    if (!scatter_any(left))
         return;
     floatv out[3];
     for (int c = 0; c < 3; c++)
         out[c] = rl_vload(0, diffuse + c * f->plane4 + v.at);
-    while (any(left)) {
+    while (scatter_any(left)) {
         int m = scatter_max_int(id & left);
         intv mine = left & (id == m);
         left &= ~mine;

@@ -64,7 +64,7 @@ static inline void gather(global const float *diffuse, global const float *depth
     float x = (float)dx * at->px, y = (float)dy * at->py;
     floatv r2 = at->z * at->z * (x * x + y * y);
     intv near = mine & (r2 <= reach2);
-    if (!any(near))
+    if (!scatter_any(near))
         return;
     int i = scatter_at(f, v, dx, dy);
     intv same = near & (rl_as_intv(rl_vload(0, stencil + i)) == material);
@@ -129,7 +129,7 @@ kernel void sss_reference_filter(global const float *diffuse, global const float
     floatv out[3];
     for (int c = 0; c < 3; c++)
         out[c] = rl_vload(0, diffuse + c * f->plane4 + v.at);
-    while (any(left)) {
+    while (scatter_any(left)) {
         int m = scatter_max_int(id & left);
         intv mine = id == m;
         left &= ~mine;
