@@ -95,6 +95,8 @@ size_t rl_plan_bytes_unshared(const rl_plan *plan, const rl_geometry *g, int in_
 
 /* `relit plan` (plan_print.c, plan_dot.c): text for people, graphviz, JSON. g may be NULL: no bytes. */
 struct rl_str; /* graph/base/text.h */
+const char *rl_layout_name(rl_layout layout);           /* "linear", "phase4" */
+const char *rl_buffer_class_name(rl_buffer_class kind); /* "source", "transient", "sink", "history" */
 void rl_plan_print_text(const rl_plan *plan, const rl_geometry *g, int in_flight, struct rl_str *out);
 void rl_plan_print_dot(const rl_plan *plan, const rl_geometry *g, int in_flight, struct rl_str *out);
 rl_code rl_plan_print_json(const rl_plan *plan, const rl_geometry *g, int in_flight, struct rl_str *out, rl_error *err);

@@ -1,4 +1,5 @@
-/* Plans: order, culling, layouts, lives, slots, history, geometry. */
+/* What must hold for every plan, on random graphs: each read finds what it should over three frames, no two
+ * lives in one slot, nothing needed is culled, nothing is made for nobody, planning twice gives the same. */
 #include <limits.h>
 #include <setjmp.h>
 #include <stdarg.h>
