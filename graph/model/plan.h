@@ -87,6 +87,8 @@ rl_code rl_plan_fits(const rl_plan *plan, const rl_geometry *g, rl_error *err);
 
 /* Bytes of one copy of a buffer, guards included. */
 size_t rl_buffer_bytes(const rl_buffer *buffer, const rl_geometry *g);
+/* How many copies exist at once: a SOURCE or SINK for each frame in flight, both halves of a pair, else 1. */
+size_t rl_buffer_copies(const rl_buffer *buffer, int in_flight);
 /* Bytes of a slot: the largest buffer that lives in it. */
 size_t rl_slot_bytes(const rl_plan *plan, int slot, const rl_geometry *g);
 /* These saturate at SIZE_MAX. Device memory for `in_flight` frames, and what it would be if no buffer shared a slot. */

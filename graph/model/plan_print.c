@@ -92,7 +92,7 @@ static void print_bar(const rl_plan *plan, const rl_buffer *b, rl_str *out)
 }
 
 static void print_buffer(const rl_plan *plan, const rl_buffer *b, int width, const rl_geometry *g,
-                         rl_str *out)
+                         int in_flight, rl_str *out)
 {
     char bytes[32];
     rl_str_printf(out, "  %-*s  %2d x %s  ", width, b->name, b->planes, rl_layout_name(b->layout));
@@ -101,14 +101,18 @@ static void print_buffer(const rl_plan *plan, const rl_buffer *b, int width, con
         rl_str_printf(out, "  slot %-3d", b->slot);
     else
         rl_str_printf(out, "  %-8s", rl_buffer_class_name(b->kind));
-    if (g)
+    if (g) {
+        const size_t copies = rl_buffer_copies(b, in_flight);
         rl_str_printf(out, "  %10s", rl_format_bytes(rl_buffer_bytes(b, g), bytes));
+        if (copies > 1)
+            rl_str_printf(out, " x %zu", copies);
+    }
     if (b->image < 0)
         rl_str_add(out, "  scratch");
     rl_str_add(out, "\n");
 }
 
-static void print_buffers(const rl_plan *plan, const rl_geometry *g, rl_str *out)
+static void print_buffers(const rl_plan *plan, const rl_geometry *g, int in_flight, rl_str *out)
 {
     static const rl_buffer_class kinds[] = {RL_BUFFER_SOURCE, RL_BUFFER_TRANSIENT, RL_BUFFER_SINK,
                                             RL_BUFFER_HISTORY};
@@ -122,7 +126,7 @@ static void print_buffers(const rl_plan *plan, const rl_geometry *g, rl_str *out
         for (int first = -1; first <= (int)plan->n_steps; first++) /* by birth */
             for (size_t i = 0; i < plan->n_buffers; i++)
                 if (plan->buffers[i].kind == kinds[k] && plan->buffers[i].first == first)
-                    print_buffer(plan, &plan->buffers[i], width, g, out);
+                    print_buffer(plan, &plan->buffers[i], width, g, in_flight, out);
 }
 
 static void print_slots(const rl_plan *plan, const rl_geometry *g, rl_str *out)
@@ -131,7 +135,8 @@ static void print_slots(const rl_plan *plan, const rl_geometry *g, rl_str *out)
     if (plan->n_slots)
         rl_str_add(out, "\nslots\n");
     for (size_t s = 0; s < plan->n_slots; s++) {
-        rl_str_printf(out, "  %3zu  %2d planes", s, plan->slot_planes[s]);
+        rl_str_printf(out, "  %3zu  %2d plane%s", s, plan->slot_planes[s],
+                      plan->slot_planes[s] == 1 ? " " : "s");
         if (g)
             rl_str_printf(out, "  %10s", rl_format_bytes(rl_slot_bytes(plan, (int)s, g), bytes));
         const char *between = "  ";
@@ -152,14 +157,33 @@ static void print_slots(const rl_plan *plan, const rl_geometry *g, rl_str *out)
 
 static void print_memory(const rl_plan *plan, const rl_geometry *g, int in_flight, rl_str *out)
 {
+    static const char *const words[] = {
+        [RL_BUFFER_SOURCE] = "sources",
+        [RL_BUFFER_TRANSIENT] = "images between passes",
+        [RL_BUFFER_SINK] = "outputs",
+        [RL_BUFFER_HISTORY] = "history",
+    };
+    size_t sums[RL_ARRAY_LENGTH(words)] = {0}, slots = 0;
     char with[32], without[32];
-    const size_t shared = rl_plan_bytes(plan, g, in_flight),
-                 unshared = rl_plan_bytes_unshared(plan, g, in_flight);
+    for (size_t i = 0; i < plan->n_buffers; i++)
+        sums[plan->buffers[i].kind] +=
+            rl_buffer_bytes(&plan->buffers[i], g) * rl_buffer_copies(&plan->buffers[i], in_flight);
+    for (size_t i = 0; i < plan->n_slots; i++)
+        slots += rl_slot_bytes(plan, (int)i, g);
     rl_str_printf(out, "\nmemory (%d x %d pixels at (%d, %d) in buffers of %d x %d, %d frame%s in flight)\n",
                   g->width, g->height, g->x, g->y, g->columns, g->rows, in_flight, in_flight == 1 ? "" : "s");
-    rl_str_printf(out, "  %s with shared slots, %s without: %.0f %% saved\n", rl_format_bytes(shared, with),
-                  rl_format_bytes(unshared, without),
-                  unshared ? 100.0 * (double)(unshared - shared) / (double)unshared : 0.0);
+    for (size_t k = 0; k < RL_ARRAY_LENGTH(words); k++) {
+        rl_str_printf(out, "  %-22s %10s", words[k],
+                      rl_format_bytes(k == RL_BUFFER_TRANSIENT ? slots : sums[k], with));
+        if (k == RL_BUFFER_TRANSIENT && slots < sums[k])
+            rl_str_printf(out, "  (%s if none shared a slot)", rl_format_bytes(sums[k], without));
+        rl_str_add(out, "\n");
+    }
+    const size_t all = rl_plan_bytes(plan, g, in_flight),
+                 unshared = rl_plan_bytes_unshared(plan, g, in_flight);
+    rl_str_printf(out, "  %-22s %10s  with reuse, %s without (%.0f %% saved)\n", "total",
+                  rl_format_bytes(all, with), rl_format_bytes(unshared, without),
+                  unshared ? 100.0 * (double)(unshared - all) / (double)unshared : 0.0);
 }
 
 static void print_outputs(const rl_plan *plan, rl_str *out)
@@ -183,7 +207,7 @@ static void print_outputs(const rl_plan *plan, rl_str *out)
 void rl_plan_print_text(const rl_plan *plan, const rl_geometry *g, int in_flight, struct rl_str *out)
 {
     print_steps(plan, out);
-    print_buffers(plan, g, out);
+    print_buffers(plan, g, in_flight, out);
     print_slots(plan, g, out);
     if (g)
         print_memory(plan, g, in_flight, out);
