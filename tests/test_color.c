@@ -40,7 +40,8 @@ static int teardown(void **state)
     return 0;
 }
 
-/* ---- running a pass ------------------------------------------------------------------------------------------ */
+/* ---- running a pass
+ * ------------------------------------------------------------------------------------------ */
 
 /* Colours between low and high: most of them dark, a tenth below 0 if low is, channels independent so that
  * saturated colours are frequent; the first ones are exact greys and primaries. */
@@ -69,16 +70,18 @@ static void run(const rl_pass *pass, float exposure, const float *in, float *out
     if (!kernel)
         fail_msg("%s", cl_harness_error(device));
     if (pass->tables)
-        assert_int_equal(pass->tables(&(rl_pass_input){.pass = pass, .params = &params}, &arena, &tables, NULL),
-                         RL_OK);
+        assert_int_equal(
+            pass->tables(&(rl_pass_input){.pass = pass, .params = &params}, &arena, &tables, NULL), RL_OK);
     float *source = rl_aligned(bytes), *result = rl_aligned(bytes);
     memcpy(source, in, bytes);
-    cl_buffer args[] = {{source, bytes},
-                        {result, bytes},
-                        {&params, sizeof params},
-                        {&frame, sizeof frame},
-                        {&material, sizeof material},
-                        {tables.data, tables.n * sizeof(float)}};
+    cl_buffer args[] = {
+        {source,      bytes                   },
+        {result,      bytes                   },
+        {&params,     sizeof params           },
+        {&frame,      sizeof frame            },
+        {&material,   sizeof material         },
+        {tables.data, tables.n * sizeof(float)}
+    };
     if (!cl_harness_run(kernel, args, tables.n ? 6 : 5, global, NULL))
         fail_msg("%s", cl_harness_error(device));
     memcpy(out, result, bytes);
@@ -99,11 +102,12 @@ static rl_color_pass make_pass(const rl_ocio *ocio, const rl_ocio_request *reque
 }
 
 typedef struct difference {
-    double absolute, clipped, relative; /* the largest; clipped: both sides brought to 0..1; relative to max(1, |x|) */
+    double absolute, clipped,
+        relative; /* the largest; clipped: both sides brought to 0..1; relative to max(1, |x|) */
 } difference;
 
-static difference compare(const rl_ocio *ocio, const rl_ocio_request *request, const rl_pass *pass, double low,
-                          double high)
+static difference compare(const rl_ocio *ocio, const rl_ocio_request *request, const rl_pass *pass,
+                          double low, double high)
 {
     float *in = rl_malloc(9 * N * sizeof *in), *got = in + 3 * N, *want = got + 3 * N;
     rl_ocio_transform *transform = NULL;
@@ -126,14 +130,15 @@ static difference compare(const rl_ocio *ocio, const rl_ocio_request *request, c
     return d;
 }
 
-/* ---- the configuration that ships -------------------------------------------------------------------------------- */
+/* ---- the configuration that ships
+ * -------------------------------------------------------------------------------- */
 
 static void test_views_match(void **state)
 {
     static const rl_ocio_request requests[] = {
-        {.from = "ACEScg", .display = "sRGB", .view = "ACES"},
-        {.from = "lin_rec709", .display = "sRGB", .view = "ACES"},
-        {.from = "lin_rec709", .display = "Rec.709", .view = "ACES"},
+        {.from = "ACEScg",     .display = "sRGB",    .view = "ACES"          },
+        {.from = "lin_rec709", .display = "sRGB",    .view = "ACES"          },
+        {.from = "lin_rec709", .display = "Rec.709", .view = "ACES"          },
         {.from = "ACES2065-1", .display = "Rec.709", .view = "Un-tone-mapped"},
     };
     (void)state;
@@ -154,8 +159,8 @@ static void test_views_match(void **state)
 static void test_spaces_match(void **state)
 {
     static const rl_ocio_request requests[] = {
-        {.from = "lin_rec709", .to = "ACEScg"},
-        {.from = "lin_rec709", .to = "ACEScct"},
+        {.from = "lin_rec709",   .to = "ACEScg"    },
+        {.from = "lin_rec709",   .to = "ACEScct"   },
         {.from = "srgb_texture", .to = "lin_rec709"},
     };
     (void)state;
@@ -163,7 +168,8 @@ static void test_spaces_match(void **state)
         rl_arena arena = {0};
         rl_color_pass pass = make_pass(config, &requests[i], &arena, NULL);
         difference d = compare(config, &requests[i], pass.pass, -0.1, 20);
-        print_message("# %s to %s: off by at most %.2g relative\n", requests[i].from, requests[i].to, d.relative);
+        print_message("# %s to %s: off by at most %.2g relative\n", requests[i].from, requests[i].to,
+                      d.relative);
         assert_true(d.relative <= 3e-6);
         rl_arena_free(&arena);
     }
@@ -219,7 +225,8 @@ static void test_same_bits(void **state)
     rl_arena_free(&arena);
 }
 
-/* ---- every generator ----------------------------------------------------------------------------------------------- */
+/* ---- every generator
+ * ----------------------------------------------------------------------------------------------- */
 
 typedef struct op_case {
     const char *transform; /* YAML, as from_scene_reference */
@@ -230,55 +237,61 @@ typedef struct op_case {
 #define POINTS "{control_points: [-6, -5, -2, -1.5, 0, 0.2, 3, 2, 6, 5]}"
 #define GRADE  "{style: log, red: " POINTS ", blue: {control_points: [-6, -6, 0, 1, 6, 5.5]}"
 
+/* clang-format off: version 14 crashes on this table */
 static const op_case ops[] = {
-    {"!<MatrixTransform> {matrix: [0.5, 0.2, 0, 0, 0, 1, 0, 0, 0.1, 0, 0.9, 0, 0, 0, 0, 1], offset: [0.1, 0, -1, 0]}", -1, 20,
+    {"!<MatrixTransform> {matrix: [0.5, 0.2, 0, 0, 0, 1, 0, 0, 0.1, 0, 0.9, 0, 0, 0, 0, 1], offset: [0.1, 0, "
+     "-1, 0]}",                                                                                                                                                                                               -1,                                                                                                                                                                                   20,1e-6},
+    {                                                                                                   "!<MatrixTransform> {matrix: [0.5, 0.2, 0, 0, 0, 1, 0, 0, 0.1, 0, 0.9, 0, 0, 0, 0, 1], offset: [0.1, 0, "
+     "-1, 0], "
+     "direction: inverse}",                                                                                                                                                                                                      -1,                                                                                                                                                                                                                                                                                                                                                                         20,1e-6},
+    {                                                                                                "!<RangeTransform> {min_in_value: 0.1, max_in_value: 4, min_out_value: 0, max_out_value: 1}",                                                                                                                                                                                                 -1,                                                                                                                                                                                          20,
      1e-6},
-    {"!<MatrixTransform> {matrix: [0.5, 0.2, 0, 0, 0, 1, 0, 0, 0.1, 0, 0.9, 0, 0, 0, 0, 1], offset: [0.1, 0, -1, 0], "
-     "direction: inverse}",
-     -1, 20, 1e-6},
-    {"!<RangeTransform> {min_in_value: 0.1, max_in_value: 4, min_out_value: 0, max_out_value: 1}", -1, 20, 1e-6},
-    {"!<LogTransform> {base: 10}", -0.1, 20, 1e-6},
-    {"!<LogTransform> {base: 2, direction: inverse}", -4, 8, 1e-6},
-    {"!<LogAffineTransform> {base: 10, log_side_slope: 0.3, log_side_offset: 0.6, lin_side_slope: [1.1, 1, 0.9], "
-     "lin_side_offset: 0.01}",
-     -0.1, 20, 3e-6},
-    {"!<LogCameraTransform> {base: 10, log_side_slope: 0.25, log_side_offset: 0.4, lin_side_slope: 5, "
-     "lin_side_offset: 0.05, lin_side_break: 0.01}",
-     -0.1, 20, 1e-6},
-    {"!<LogCameraTransform> {base: 10, log_side_slope: 0.25, log_side_offset: 0.4, lin_side_slope: 5, "
-     "lin_side_offset: 0.05, lin_side_break: 0.01, linear_slope: 4, direction: inverse}",
-     -0.1, 1.1, 3e-6},
-    {"!<ExponentTransform> {value: 2.2}", -0.1, 4, 1e-6},
-    {"!<ExponentTransform> {value: [2.2, 1, 1.8, 1], style: mirror, direction: inverse}", -1, 4, 1e-6},
-    {"!<ExponentTransform> {value: [0.4, 2, 1.5, 1], style: pass_thru}", -1, 4, 1e-6},
-    {"!<ExponentWithLinearTransform> {gamma: 2.4, offset: 0.055}", -0.1, 2, 1e-6},
-    {"!<ExponentWithLinearTransform> {gamma: 2.4, offset: 0.055, style: mirror, direction: inverse}", -1, 4, 1e-6},
-    {"!<CDLTransform> {slope: [1.1, 1, 0.9], offset: [0.01, -0.02, 0], power: [1.2, 1, 0.8], saturation: 0.8}", -0.1, 4, 3e-6},
-    {"!<CDLTransform> {slope: [1.1, 1, 0.9], offset: [0.01, -0.02, 0], power: [1.2, 1, 0.8], sat: 1.2, style: asc, "
-     "direction: inverse}",
-     -0.1, 1.5, 3e-6},
-    {"!<ExposureContrastTransform> {style: linear, exposure: 0.5, contrast: 1.3, gamma: 1, pivot: 0.18}", -0.1, 4, 1e-5},
-    {"!<ExposureContrastTransform> {style: video, exposure: -1, contrast: 0.7, gamma: 1.1, pivot: 0.18, direction: inverse}",
-     -0.1, 1.5, 1e-5},
-    {"!<ExposureContrastTransform> {style: log, exposure: 1, contrast: 0.7, gamma: 1.1, pivot: 0.18}", -0.1, 1.5, 1e-6},
-    {"!<GradingRGBCurveTransform> " GRADE ", master: " POINTS "}", -10, 10, 3e-6},
-    {"!<GradingRGBCurveTransform> " GRADE ", direction: inverse}", -5, 5, 3e-5},
-    {"!<GradingRGBCurveTransform> {style: linear, master: " POINTS "}", -0.1, 20, 3e-5},
-    {"!<FixedFunctionTransform> {style: ACES_Glow03}", -0.1, 4, 1e-6},
-    {"!<FixedFunctionTransform> {style: ACES_Glow10, direction: inverse}", -0.1, 4, 1e-6},
-    {"!<FixedFunctionTransform> {style: ACES_RedMod03}", -0.1, 4, 1e-5},
-    {"!<FixedFunctionTransform> {style: ACES_RedMod03, direction: inverse}", 0, 4, 1e-5},
-    {"!<FixedFunctionTransform> {style: ACES_RedMod10, direction: inverse}", 0, 4, 1e-5},
-    {"!<FixedFunctionTransform> {style: ACES_DarkToDim10, direction: inverse}", -0.1, 4, 1e-6},
-    {"!<FixedFunctionTransform> {style: REC2100_Surround, params: [0.78]}", -0.1, 4, 1e-6},
-    {"!<BuiltinTransform> {style: ACES-LMT - ACES 1.3 Reference Gamut Compression}", -0.1, 20, 3e-5},
-    {"!<BuiltinTransform> {style: ACES-LMT - ACES 1.3 Reference Gamut Compression, direction: inverse}", 0, 2, 3e-3}, /* has a pole */
-    {"!<BuiltinTransform> {style: CURVE - LINEAR_to_ST-2084}", -0.1, 100, 1e-5},
-    {"!<BuiltinTransform> {style: ADX10_to_ACES2065-1}", 0, 1, 1e-4},
-    {"!<FileTransform> {src: curve.spi1d}", -0.1, 2, 1e-6},
-    {"!<FileTransform> {src: cube.cube, interpolation: tetrahedral}", -0.1, 1.2, 1e-6},
-    {"!<FileTransform> {src: cube.cube, interpolation: linear}", -0.1, 1.2, 1e-6},
+    {                                                                                               "!<LogTransform> {base: 10}",                                                                                                                                                                                                  -0.1,                                                                                                                                                                                                                                                            20,1e-6},
+    {                                                                                               "!<LogTransform> {base: 2, direction: inverse}",                                                                                                                                                                                                 -4,                                                                                                                                                                                                                                        8,1e-6},
+    {                                                                                                 "!<LogAffineTransform> {base: 10, log_side_slope: 0.3, log_side_offset: 0.6, lin_side_slope: [1.1, 1, "
+     "0.9], "
+     "lin_side_offset: 0.01}",                                                                                                                                                                                                 -0.1,                                                                                                                                                                                                                                                                                                                                                                                      20,3e-6},
+    {                                                                                                "!<LogCameraTransform> {base: 10, log_side_slope: 0.25, log_side_offset: 0.4, lin_side_slope: 5, "
+     "lin_side_offset: 0.05, lin_side_break: 0.01}",                                                                                                                                                                                               -0.1,20,1e-6},
+    {                                                                                                  "!<LogCameraTransform> {base: 10, log_side_slope: 0.25, log_side_offset: 0.4, lin_side_slope: 5, "
+     "lin_side_offset: 0.05, lin_side_break: 0.01, linear_slope: 4, direction: inverse}",                                                                                                                                                                                               -0.1,                                                                                                                                                                                                                                                                                                                                                                                      1.1,                                                                                                                                                   3e-6},
+    {                                                                                                  "!<ExponentTransform> {value: 2.2}",                                                                                                                                                                                              -0.1,4,1e-6},
+    {                                                                                                  "!<ExponentTransform> {value: [2.2, 1, 1.8, 1], style: mirror, direction: inverse}",                                                                                                                                                                                                -1,                                                                                                                                                                                                                                                                                                                                                                                        4,                                                                                                                                                                                                                                                                                                                                                                                                                                                                                              1e-6},
+    {                                                                                                  "!<ExponentTransform> {value: [0.4, 2, 1.5, 1], style: pass_thru}",                                                                                                                                                                                                -1,4,1e-6},
+    {                                                                                                  "!<ExponentWithLinearTransform> {gamma: 2.4, offset: 0.055}",                                                                                                                                                                                                -0.1,                                                                                                                                                                                                                                                                                                                                                                                        2,                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                               1e-6},
+    {                                                                                               "!<ExponentWithLinearTransform> {gamma: 2.4, offset: 0.055, style: mirror, direction: inverse}",                                                                                                                                                                                                -1,4,
+     1e-6},
+    {                                                                               "!<CDLTransform> {slope: [1.1, 1, 0.9], offset: [0.01, -0.02, 0], power: [1.2, 1, 0.8], saturation: "
+     "0.8}",                                                                                                                                                                                                    -0.1,                                                                                                                                                                                                                                                                                                                                                                                        4,3e-6},
+    {                                                                                                    "!<CDLTransform> {slope: [1.1, 1, 0.9], offset: [0.01, -0.02, 0], power: [1.2, 1, 0.8], sat: 1.2, "
+     "style: asc, "
+     "direction: inverse}",-0.1,1.5,3e-6},
+    {                                                                                                   "!<ExposureContrastTransform> {style: linear, exposure: 0.5, contrast: 1.3, gamma: 1, pivot: 0.18}",
+     -0.1,                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                             4,                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                    1e-5},
+    {                                                                                                   "!<ExposureContrastTransform> {style: video, exposure: -1, contrast: 0.7, gamma: 1.1, pivot: 0.18, "
+     "direction: inverse}",                                                                                                                                                                                                    -0.1,1.5,1e-5},
+    {                                                                                                   "!<ExposureContrastTransform> {style: log, exposure: 1, contrast: 0.7, gamma: 1.1, pivot: 0.18}",                                                                                                                                                                                   -0.1,
+     1.5,1e-6},
+    {                                                                                                   "!<GradingRGBCurveTransform> " GRADE ", master: " POINTS "}",   -10, 10,3e-6},
+    {                                                                                                   "!<GradingRGBCurveTransform> " GRADE ", direction: inverse}",                                       -5,                                                                                                                                                                                                                      5,3e-5},
+    {                                                                                                   "!<GradingRGBCurveTransform> {style: linear, master: " POINTS "}",                                       -0.1,                                                                                                                                                                                   20,3e-5},
+    {                                                                                                   "!<FixedFunctionTransform> {style: ACES_Glow03}",                                  -0.1,                                                                                                                                                                            4,1e-6},
+    {                                                                                                   "!<FixedFunctionTransform> {style: ACES_Glow10, direction: inverse}",                                                   -0.1,                                                                                                                                                                                                  4,1e-6},
+    {                                                                                                   "!<FixedFunctionTransform> {style: ACES_RedMod03}",                               -0.1,                                                                                                                                                             4,1e-5},
+    {                                                                                                   "!<FixedFunctionTransform> {style: ACES_RedMod03, direction: inverse}",                                                 0,                                                                                                                                                                                                   4,1e-5},
+    {                                                                                                   "!<FixedFunctionTransform> {style: ACES_RedMod10, direction: inverse}",                             0,                                                                                                                                                                4,1e-5},
+    {                                                                                                   "!<FixedFunctionTransform> {style: ACES_DarkToDim10, direction: inverse}",                             -0.1,                                                                                                                                                                                    4,1e-6},
+    {                                                                                                   "!<FixedFunctionTransform> {style: REC2100_Surround, params: [0.78]}",                          -0.1,                                                                                                                                                                              4,1e-6},
+    {                                                                                                   "!<BuiltinTransform> {style: ACES-LMT - ACES 1.3 Reference Gamut Compression}",                              -0.1,                                                                                                                                                                                     20,3e-5},
+    {                                                                                                   "!<BuiltinTransform> {style: ACES-LMT - ACES 1.3 Reference Gamut Compression, direction: inverse}",                     0,                                                                                                                                                                        2,
+     3e-3}, /* has a pole */
+    {                                                                                                   "!<BuiltinTransform> {style: CURVE - LINEAR_to_ST-2084}", -0.1,                                                                                                                                                                100,1e-5},
+    {                                                                                                   "!<BuiltinTransform> {style: ADX10_to_ACES2065-1}",                                           0,                                                                                                                                                                                                                           1,1e-4},
+    {                                                                                                   "!<FileTransform> {src: curve.spi1d}",                                                 -0.1,                                                                                                                                                                                          2,1e-6},
+    {                                                      "!<FileTransform> {src: cube.cube, interpolation: tetrahedral}",                                                              -0.1,                                                                                                                                                                                              1.2,1e-6},
+    {                                                                                                    "!<FileTransform> {src: cube.cube, interpolation: linear}",                                                                                 -0.1,                                                                                                                                                                                                    1.2,1e-6},
 };
+/* clang-format on */
 
 static void write_tables(const char *folder)
 {
@@ -305,12 +318,13 @@ static rl_ocio *config_with(const char *folder, const char *transform)
     rl_error err = {0};
     rl_ocio *ocio = NULL;
     rl_str s = {0};
-    rl_str_printf(&s,
-                  "ocio_profile_version: 2.1\nsearch_path: .\nroles: {default: a}\ndisplays:\n  d:\n"
-                  "    - !<View> {name: v, colorspace: b}\nfile_rules:\n  - !<Rule> {name: Default, colorspace: a}\n"
-                  "colorspaces:\n  - !<ColorSpace>\n    name: a\n  - !<ColorSpace>\n    name: b\n"
-                  "    from_scene_reference: %s\n",
-                  transform);
+    rl_str_printf(
+        &s,
+        "ocio_profile_version: 2.1\nsearch_path: .\nroles: {default: a}\ndisplays:\n  d:\n"
+        "    - !<View> {name: v, colorspace: b}\nfile_rules:\n  - !<Rule> {name: Default, colorspace: a}\n"
+        "colorspaces:\n  - !<ColorSpace>\n    name: a\n  - !<ColorSpace>\n    name: b\n"
+        "    from_scene_reference: %s\n",
+        transform);
     snprintf(path, sizeof path, "%s/config.ocio", folder);
     assert_int_equal(rl_file_write(path, s.text, s.length, NULL), RL_OK);
     if (rl_ocio_open(path, &ocio, &err) != RL_OK)
@@ -345,8 +359,8 @@ static void test_every_operation(void **state)
         assert_non_null(pass.pass);
         difference d = compare(ocio, &request, pass.pass, ops[i].low, ops[i].high);
         if (pass.baked || !(d.relative <= ops[i].bound)) {
-            print_message("# %s: %s, off by %g (bound %g)\n", ops[i].transform, pass.baked ? "baked" : "exact",
-                          d.relative, ops[i].bound);
+            print_message("# %s: %s, off by %g (bound %g)\n", ops[i].transform,
+                          pass.baked ? "baked" : "exact", d.relative, ops[i].bound);
             bad++;
         }
         rl_arena_free(&arena);
@@ -356,7 +370,8 @@ static void test_every_operation(void **state)
     assert_int_equal(bad, 0);
 }
 
-/* ---- what has no generator ------------------------------------------------------------------------------------------- */
+/* ---- what has no generator
+ * ------------------------------------------------------------------------------------------- */
 
 static void count_warning(void *ctx, rl_severity severity, rl_where where, const char *text)
 {
@@ -388,11 +403,14 @@ static void test_bakes_and_says_so(void **state)
     remove_folder(folder);
 }
 
-/* ---- the vector functions --------------------------------------------------------------------------------------------- */
+/* ---- the vector functions
+ * --------------------------------------------------------------------------------------------- */
 
-/* Three planes of results from one of arguments: log2, exp2, the hue's weight with red = 1 and green = tangent. */
+/* Three planes of results from one of arguments: log2, exp2, the hue's weight with red = 1 and green =
+ * tangent. */
 static const char functions_kernel[] =
-    "kernel void functions(global const float *in, global float *out, constant params_t *p, constant frame_t *f,\n"
+    "kernel void functions(global const float *in, global float *out, constant params_t *p, constant frame_t "
+    "*f,\n"
     "                      constant material_t *m)\n"
     "{\n"
     "    int i = rl_index(f, RL_W * (int)get_global_id(0), (int)get_global_id(1));\n"
@@ -413,13 +431,18 @@ static void test_functions(void **state)
     rl_str text = {0};
     float *in = rl_malloc(6 * N * sizeof *in), *out = in + 3 * N;
     static const rl_param params[] = {P(rl_color_params, RL_F32, exposure, -64, 64, 0, "stops", "unused")};
-    static const rl_step steps[] = {{"functions", RL_EVERY_VECTOR}};
+    static const rl_step steps[] = {
+        {"functions", RL_EVERY_VECTOR}
+    };
     double log_error = 0, exp_error = 0, hue_error = 0;
     (void)state;
     for (const char *const *piece = rl_color_prelude; *piece; piece++)
         rl_str_add(&text, *piece);
     rl_str_add(&text, functions_kernel);
-    rl_pass pass = {.name = "functions", .kernel_text = text.text, .kernel_file = "test", .params = RL_ARRAY(params),
+    rl_pass pass = {.name = "functions",
+                    .kernel_text = text.text,
+                    .kernel_file = "test",
+                    .params = RL_ARRAY(params),
                     .steps = RL_ARRAY(steps)};
     for (int i = 0; i < N; i++) {
         in[i] = (float)exp2(-126 + 253.0 * i / N);
@@ -442,21 +465,42 @@ static void test_functions(void **state)
     rl_free(in);
 }
 
-/* ---- names and primaries ---------------------------------------------------------------------------------------------- */
+/* ---- names and primaries
+ * ---------------------------------------------------------------------------------------------- */
 
 static void test_names(void **state)
 {
     const char *space;
     (void)state;
-    static const char *const aliases[][2] = {
-        {"lin_srgb", "lin_rec709"}, {"sRGB", "srgb_texture"},        {"acescg", "ACEScg"},   {"aces", "ACES2065-1"},
-        {"data", "raw"},            {"scene_linear", "lin_rec709"},  {"ap1", "ACEScg"},      {"linear", "lin_rec709"},
-        {"default", "lin_rec709"},  {"aces_interchange", "ACES2065-1"},
-        {"cie_xyz_d65_interchange", "CIE-XYZ-D65"},
+    static const char *const aliases[] = {
+        "lin_srgb",
+        "lin_rec709",
+        "sRGB",
+        "srgb_texture",
+        "acescg",
+        "ACEScg",
+        "aces",
+        "ACES2065-1",
+        "data",
+        "raw",
+        "ap1",
+        "ACEScg",
+        "scene_linear",
+        "lin_rec709",
+        "linear",
+        "lin_rec709",
+        "ap0",
+        "ACES2065-1",
+        "default",
+        "lin_rec709",
+        "aces_interchange",
+        "ACES2065-1",
+        "cie_xyz_d65_interchange",
+        "CIE-XYZ-D65",
     };
-    for (size_t i = 0; i < sizeof aliases / sizeof *aliases; i++) {
-        assert_int_equal(rl_color_space(config, aliases[i][0], RL_NOWHERE, &space, NULL), RL_OK);
-        assert_string_equal(space, aliases[i][1]);
+    for (size_t i = 0; i < sizeof aliases / sizeof *aliases; i += 2) {
+        assert_int_equal(rl_color_space(config, aliases[i], RL_NOWHERE, &space, NULL), RL_OK);
+        assert_string_equal(space, aliases[i + 1]);
     }
     assert_int_equal(rl_color_working(config, RL_NOWHERE, &space, NULL), RL_OK);
     assert_string_equal(space, "lin_rec709");
@@ -513,7 +557,8 @@ static void test_unnamed_primaries(void **state)
     (void)state;
     assert_non_null(mkdtemp(folder));
     /* Red and green are swapped against AP0, which no well known set does. */
-    rl_ocio *ocio = config_with(folder, "!<MatrixTransform> {matrix: [0, 1, 0, 0, 1, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]}");
+    rl_ocio *ocio =
+        config_with(folder, "!<MatrixTransform> {matrix: [0, 1, 0, 0, 1, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]}");
     assert_int_equal(rl_color_primaries(ocio, "b", RL_NOWHERE, &p, NULL), RL_OK);
     assert_false(p.known); /* no role aces_interchange */
     rl_ocio_free(&ocio);
@@ -523,12 +568,18 @@ static void test_unnamed_primaries(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_views_match),       cmocka_unit_test(test_spaces_match),
-        cmocka_unit_test(test_no_change_no_pass), cmocka_unit_test(test_exposure),
-        cmocka_unit_test(test_same_bits),         cmocka_unit_test(test_every_operation),
-        cmocka_unit_test(test_bakes_and_says_so), cmocka_unit_test(test_functions),
-        cmocka_unit_test(test_names),             cmocka_unit_test(test_unknown_names),
-        cmocka_unit_test(test_primaries),         cmocka_unit_test(test_unnamed_primaries),
+        cmocka_unit_test(test_views_match),
+        cmocka_unit_test(test_spaces_match),
+        cmocka_unit_test(test_no_change_no_pass),
+        cmocka_unit_test(test_exposure),
+        cmocka_unit_test(test_same_bits),
+        cmocka_unit_test(test_every_operation),
+        cmocka_unit_test(test_bakes_and_says_so),
+        cmocka_unit_test(test_functions),
+        cmocka_unit_test(test_names),
+        cmocka_unit_test(test_unknown_names),
+        cmocka_unit_test(test_primaries),
+        cmocka_unit_test(test_unnamed_primaries),
     };
     return cmocka_run_group_tests_name("color", tests, setup, teardown);
 }

@@ -200,7 +200,7 @@ const char *const rl_color_prelude[] = {
     "    *b = w0 * GATHER(t + 2, i) + w1 * GATHER(t + 2, i1) + w2 * GATHER(t + 2, i2) + least * GATHER(t + "
     "2, i3);\n"
     "}\n"
-    "\n"
+    "\n",
     "static inline floatv rl_c_corners(constant float *t, int n, intv i, floatv x, floatv y, floatv z)\n"
     "{\n"
     "    int dx = 3 * n * n, dy = 3 * n;\n"

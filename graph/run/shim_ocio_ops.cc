@@ -172,65 +172,48 @@ static void read_curves(rl_arena *arena, const OCIO::GradingRGBCurveTransform &t
 
 static void read_fixed(const OCIO::FixedFunctionTransform &t, rl_op *op)
 {
-    switch (t.getStyle()) {
-    case OCIO::FIXED_FUNCTION_ACES_RED_MOD_03:
-        op->u.fixed.style = RL_FIXED_RED_MOD_03;
-        break;
-    case OCIO::FIXED_FUNCTION_ACES_RED_MOD_10:
-        op->u.fixed.style = RL_FIXED_RED_MOD_10;
-        break;
-    case OCIO::FIXED_FUNCTION_ACES_GLOW_03:
-        op->u.fixed.style = RL_FIXED_GLOW_03;
-        break;
-    case OCIO::FIXED_FUNCTION_ACES_GLOW_10:
-        op->u.fixed.style = RL_FIXED_GLOW_10;
-        break;
-    case OCIO::FIXED_FUNCTION_ACES_DARK_TO_DIM_10:
-        op->u.fixed.style = RL_FIXED_DARK_TO_DIM_10;
-        break;
-    case OCIO::FIXED_FUNCTION_ACES_GAMUT_COMP_13:
-        op->u.fixed.style = RL_FIXED_GAMUT_COMP_13;
-        break;
-    case OCIO::FIXED_FUNCTION_REC2100_SURROUND:
-        op->u.fixed.style = RL_FIXED_REC2100_SURROUND;
-        break;
-    case OCIO::FIXED_FUNCTION_RGB_TO_HSV:
-        op->u.fixed.style = RL_FIXED_HSV;
-        break;
-    case OCIO::FIXED_FUNCTION_XYZ_TO_xyY:
-        op->u.fixed.style = RL_FIXED_XYY;
-        break;
-    case OCIO::FIXED_FUNCTION_XYZ_TO_uvY:
-        op->u.fixed.style = RL_FIXED_UVY;
-        break;
-    case OCIO::FIXED_FUNCTION_XYZ_TO_LUV:
-        op->u.fixed.style = RL_FIXED_LUV;
-        break;
-    default:
-        return;
-    }
+    static const struct {
+        OCIO::FixedFunctionStyle theirs;
+        rl_op_fixed ours;
+    } styles[] = {
+        {OCIO::FIXED_FUNCTION_ACES_RED_MOD_03,     RL_FIXED_RED_MOD_03      },
+        {OCIO::FIXED_FUNCTION_ACES_RED_MOD_10,     RL_FIXED_RED_MOD_10      },
+        {OCIO::FIXED_FUNCTION_ACES_GLOW_03,        RL_FIXED_GLOW_03         },
+        {OCIO::FIXED_FUNCTION_ACES_GLOW_10,        RL_FIXED_GLOW_10         },
+        {OCIO::FIXED_FUNCTION_ACES_DARK_TO_DIM_10, RL_FIXED_DARK_TO_DIM_10  },
+        {OCIO::FIXED_FUNCTION_ACES_GAMUT_COMP_13,  RL_FIXED_GAMUT_COMP_13   },
+        {OCIO::FIXED_FUNCTION_REC2100_SURROUND,    RL_FIXED_REC2100_SURROUND},
+        {OCIO::FIXED_FUNCTION_RGB_TO_HSV,          RL_FIXED_HSV             },
+        {OCIO::FIXED_FUNCTION_XYZ_TO_xyY,          RL_FIXED_XYY             },
+        {OCIO::FIXED_FUNCTION_XYZ_TO_uvY,          RL_FIXED_UVY             },
+        {OCIO::FIXED_FUNCTION_XYZ_TO_LUV,          RL_FIXED_LUV             },
+    };
     if (t.getNumParams() > sizeof op->u.fixed.params / sizeof(double))
         return;
     t.getParams(op->u.fixed.params);
-    op->kind = RL_OP_FIXED;
+    for (const auto &style : styles)
+        if (style.theirs == t.getStyle()) {
+            op->u.fixed.style = style.ours;
+            op->kind = RL_OP_FIXED;
+        }
 }
 
 static bool read_negative(OCIO::NegativeStyle style, rl_op_negative *out)
 {
-    switch (style) {
-    case OCIO::NEGATIVE_CLAMP:
-        *out = RL_NEGATIVE_CLAMP;
-        return true;
-    case OCIO::NEGATIVE_MIRROR:
-        *out = RL_NEGATIVE_MIRROR;
-        return true;
-    case OCIO::NEGATIVE_PASS_THRU:
-        *out = RL_NEGATIVE_PASS;
-        return true;
-    case OCIO::NEGATIVE_LINEAR:
-        *out = RL_NEGATIVE_LINEAR;
-        return true;
-    }
+    static const struct {
+        OCIO::NegativeStyle theirs;
+        rl_op_negative ours;
+    } styles[] = {
+        {OCIO::NEGATIVE_CLAMP,     RL_NEGATIVE_CLAMP },
+        {OCIO::NEGATIVE_MIRROR,    RL_NEGATIVE_MIRROR},
+        {OCIO::NEGATIVE_PASS_THRU, RL_NEGATIVE_PASS  },
+        {OCIO::NEGATIVE_LINEAR,    RL_NEGATIVE_LINEAR}
+    };
+    for (const auto &known : styles)
+        if (known.theirs == style) {
+            *out = known.ours;
+            return true;
+        }
     return false;
 }
 
