@@ -223,15 +223,15 @@ void twin_burley(const twin_scene *s, int x, int y, int n, bool turn, int seed, 
             continue;
         double dz = same ? (s->depth[at(s, px, py)] - z) / (most * 1e-3) : 0;
         double r = sqrt(((double)tx[i] * tx[i] + (double)ty[i] * ty[i]) * scale * scale + dz * dz);
-        double area = same ? area_of(s, px, py) : own;
+        double area = same ? area_of(s, px, py) / own : 1;
         for (int k = 0; k < 3; k++) {
-            double w = rl_burley_profile(r, d[k] / most) * tw[i] * area;
+            double w = rl_burley_profile(r, d[k] / most) * 8 * pi * (d[k] / most) * tw[i] * area;
             weights[k] += w;
             if (same)
                 sum[k] += w * s->diffuse[k * plane(s) + at(s, px, py)];
         }
     }
     for (int k = 0; k < 3; k++)
-        filtered[k] = weights[k] > 0 ? sum[k] / weights[k] : s->diffuse[k * plane(s) + at(s, x, y)];
+        filtered[k] = weights[k] > 1e-12 ? sum[k] / weights[k] : s->diffuse[k * plane(s) + at(s, x, y)];
     rl_free(tx);
 }
