@@ -56,7 +56,7 @@ static rl_code read_stencil_names(rl_manifest_reader *r, const rl_value *v)
             return code;
         if (rl_manifest_stencil_name(m, (uint32_t)id))
             return rl_fail(r->err, RL_E_CONFIG, e->where, "stencil_names: the id %s is named twice", e->key);
-        m->stencil_names[m->n_stencil_names++] = (rl_stencil_name){(uint32_t)id, name};
+        m->stencil_names[m->n_stencil_names++] = (rl_stencil_label){(uint32_t)id, name};
     }
     return RL_OK;
 }

@@ -119,10 +119,10 @@ typedef struct rl_pattern {
     bool numbered;
 } rl_pattern;
 
-typedef struct rl_stencil_name {
+typedef struct rl_stencil_label {
     uint32_t id; /* negative ids of signed writers are the same 32 bits */
     const char *name;
-} rl_stencil_name;
+} rl_stencil_label;
 
 typedef struct rl_manifest {
     rl_where where;
@@ -139,7 +139,7 @@ typedef struct rl_manifest {
     rl_layer *layers;
     int n_layers;
     rl_lights lights;
-    rl_stencil_name *stencil_names;
+    rl_stencil_label *stencil_names;
     size_t n_stencil_names;
     rl_frames cuts; /* frames that start a new shot */
 } rl_manifest;

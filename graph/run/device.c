@@ -41,7 +41,8 @@ struct rl_memory {
     cl_mem mem;
     size_t bytes;
     void *host;   /* host-memory devices: ours */
-    void *mapped; /* others: while mapped */
+    void *mapped;
+    int maps; /* how often it is mapped */
 };
 
 struct rl_program {
@@ -338,18 +339,25 @@ size_t rl_memory_bytes(const rl_memory *memory)
 rl_code rl_memory_map(rl_memory *memory, bool write, void **out, rl_error *err)
 {
     cl_int status = CL_OUT_OF_RESOURCES;
-    *out = NULL;
+    *out = memory->mapped;
+    if (memory->maps > 0) {
+        memory->maps++;
+        return RL_OK;
+    }
     cl_map_flags flags = write ? CL_MAP_READ | CL_MAP_WRITE : CL_MAP_READ;
     if (!injected())
         *out = clEnqueueMapBuffer(memory->device->mapper, memory->mem, CL_TRUE, flags, 0, memory->bytes, 0,
                                   NULL, NULL, &status);
     memory->mapped = *out;
+    memory->maps = *out != NULL;
     return *out ? RL_OK : fail_cl(err, status, "a buffer cannot be mapped");
 }
 
 rl_code rl_memory_unmap(rl_memory *memory, rl_error *err)
 {
     cl_event done = NULL;
+    if (--memory->maps > 0)
+        return RL_OK;
     cl_int status =
         CL(clEnqueueUnmapMemObject(memory->device->mapper, memory->mem, memory->mapped, 0, NULL, &done));
     memory->mapped = NULL;

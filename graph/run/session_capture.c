@@ -86,7 +86,7 @@ static rl_code bind_manifest(rl_session *s, rl_sequence *q, rl_error *err)
         if (!code)
             code = list_channels(&s->arena, file, &channels, &n, err);
         if (!code)
-            code = rl_manifest_bind(&s->arena, m, p, channels, n, err);
+            code = rl_manifest_bind(&s->arena, m, p, path, channels, n, err);
         rl_exr_close(&file);
     }
     return code;
