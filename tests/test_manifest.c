@@ -231,15 +231,14 @@ static void test_bad(void **state)
         {"files: []\n",                                              "1:8: error: 'files': expected a path, such as shot.####.exr, found an empty list"},
         {"fps: 24fps\nfiles: a.exr\n",
          "1:6: error: 'fps': expected frames a second, such as 24 or 24000/1001, found the text '24fps'"                                               },
-        {"fps: 0\n",                                                 "1:6: error: 'fps' is 0: out of range, above 0 and at most 1e6"                                   },
-        {"unit: inch\n",                                             "1:7: error: 'unit': 'inch' is not one of its words; known: cm, m, mm"            },
+        {"fps: 0\n",                                                 "1:6: error: 'fps' is 0: out of range, above 0 and at most 1e6"                   },
+        {"unit: inch\n",                                             "1:7: error: 'unit': there is no word 'inch'; known: cm, m, mm"                   },
         {"unit: -1\n",                                               "1:7: error: 'unit' is -1: out of range, above 0"                                 },
         {"camera: {forwards: -z}\n",
          "1:10: error: camera has no key 'forwards'; did you mean 'forward'? known: "
          "forward, fov_x, jitter, matrix"                                                                                                              },
-        {"camera: {forward: z}\n",
-         "1:19: error: 'forward': 'z' is not one of its words; did you mean '-z'? known: "
-         "+z, -z"                                                                                                                                      },
+        {"camera: {forward: z}\n",                                   "1:19: error: 'forward': there is no word 'z'; did you mean '-z'? known: "
+                                   "+z, -z"                                                                          },
         {"camera: {fov_x: 180}\n",                                   "1:17: error: 'fov_x' is 180: out of range, 0.001 to 179.9"                       },
         {"camera: {fov_x: wide}\n",
          "1:17: error: 'fov_x': expected header, degrees, or a list of degrees, found the text 'wide'"                                                 },
@@ -261,20 +260,20 @@ static void test_bad(void **state)
         {"files: {albedo: a.exr}\n",
          "1:8: error: files: no file is given for layer 'normal' (nor a default)"                                                                      },
         {"files: {default: a.exr, depht: b.exr}\n",                  "1:25: error: files: the capture has no layer 'depht'; "
-         "did you mean 'depth'? known: albedo, default, depth, "
-                                                    "normal, stencil"                                                                                                    },
+                                                    "did you mean 'depth'? known: albedo, default, depth, "
+                                                    "normal, stencil"                               },
         {"files: a.exr\nframes: 1-3\ncamera: {fov_x: [30, 40]}\n",
-         "3:9: error: camera: 'fov_x' lists 2, but the capture has 3 frames"},
-        {"files: a.exr\nstencil_names: {x: skin}\n",                                                          "2:17: error: stencil_names: 'x' is no 32-bit integer"                                                                                                                  },
+         "3:9: error: camera: 'fov_x' lists 2, but the capture has 3 frames"                                                                           },
+        {"files: a.exr\nstencil_names: {x: skin}\n",                 "2:17: error: stencil_names: 'x' is no 32-bit integer"                            },
         {"files: a.exr\nstencil_names: {4294967296: skin}\n",
-         "2:17: error: stencil_names: '4294967296' is no 32-bit integer"},
+         "2:17: error: stencil_names: '4294967296' is no 32-bit integer"                                                                               },
         {"files: a.exr\nstencil_names: {1: skin, 0x1: wax}\n",
-         "2:26: error: stencil_names: the id 0x1 is named twice"                                                                                                                 },
+         "2:26: error: stencil_names: the id 0x1 is named twice"                                                                                       },
         {"preset: blander\n",
          "1:9: error: there is no preset 'blander'; did you mean 'blender'? known: arnold, "
-         "blender, relit"        },
+         "blender, relit"                                                                                                                              },
         {"preset: ../presets/blender\n",
-         "1:9: error: there is no preset '../presets/blender'; known: arnold, blender, relit"                                                                                                      },
+         "1:9: error: there is no preset '../presets/blender'; known: arnold, blender, relit"                                                          },
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++)
         refuse(with("%s%s", rows[i].text, layers), with("shots/capture.yaml:%s", rows[i].expected));
@@ -303,8 +302,7 @@ static void test_bad_layers(void **state)
         {"thickness: {channels: T, remap: [5, 1]}",                  "'remap' must be [min, max] with 0 <= min < max"                       },
         {"emission: [a, b]",                                         "layer 'emission': expected a list of 3 channel names"                 },
         {"emission: [a, [b], c]",                                    "'channels': expected the name of a channel, found a list of 1"        },
-        {"back_depth: {channels: D, kind: z}",
-         "'kind': 'z' is not one of its words; known: device, planar, radial"                                                               },
+        {"back_depth: {channels: D, kind: z}",                       "'kind': there is no word 'z'; known: device, planar, radial"          },
         {"back_depth: {channels: D, kind: device, near: 1}",
          "layer 'back_depth': device depth needs 'near' and 'far'"                                                                          },
         {"back_depth: {channels: D, kind: device, near: 2, far: 2}",
@@ -314,11 +312,11 @@ static void test_bad_layers(void **state)
          "layer 'back_depth': 'near' belongs to `kind: device`"                                                                             },
         {"back_depth: {channels: D, empty: .nan}",                   "'empty' is .nan: a number is needed"                                  },
         {"back_normal: {channels: [a, b, c], space: view}",
-         "'space': 'view' is not one of its words; known: camera, world"                                                                    },
+         "'space': there is no word 'view'; known: camera, world"                                                                           },
         {"back_normal: {channels: [a, b, c], encoding: octahedral}",
          "layer 'back_normal': expected a list of 2 channel names"                                                                          },
         {"motion: {channels: [a, b], unit: metres}",
-         "'unit': 'metres' is not one of its words; known: ndc, pixels, uv"                                                                 },
+         "'unit': there is no word 'metres'; known: ndc, pixels, uv"                                                                        },
         {"shadow: shadow.key",                                       "'shadow': expected a map, light: channel, found the text 'shadow.key'"},
         {"shadow: {key: [a, b]}",                                    "layer 'shadow.key': expected a list of 1 channel name"                },
         {"roughness: {channels: R, unit: m}",                        "layer 'roughness' has no key 'unit'; known: channels, part"           },
@@ -381,6 +379,21 @@ static void test_camera(void **state)
     assert_int_equal(rl_manifest_view(m, 1, NULL, out, &err), RL_E_FORMAT);
     assert_message("shots/capture.yaml:4:9: error: frame 1: the file has no attribute worldToCamera; give "
                    "camera.matrix");
+    float scaled[16], transposed[16];
+    for (int i = 0; i < 16; i++) {
+        scaled[i] = i < 12 ? header[i] * 0.01f : header[i];
+        transposed[i] = header[4 * (i % 4) + i / 4];
+    }
+    assert_int_equal(rl_manifest_view(m, 2, scaled, out, &err), RL_E_FORMAT);
+    assert_non_null(
+        strstr(err.text, "frame 2: worldToCamera (as column vectors) must rotate and shift only"));
+    err = (rl_error){0};
+    assert_int_equal(rl_manifest_view(m, 2, transposed, out, &err), RL_E_FORMAT);
+    assert_non_null(strstr(err.text, "the last row must be 0, 0, 0, 1"));
+    err = (rl_error){0};
+    scaled[0] = NAN;
+    assert_int_equal(rl_manifest_view(m, 2, scaled, out, &err), RL_E_FORMAT);
+    err = (rl_error){0};
     m = parse(with("files: a.exr\nframes: 10,20\ncamera: {forward: -z, matrix: "
                    "[[1,0,0,1, 0,1,0,2, 0,0,1,3, 0,0,0,1], [1,0,0,4, 0,0,1,5, 0,-1,0,6, 0,0,0,1]]}\n%s",
                    layers));
@@ -526,34 +539,34 @@ static void test_bad_lights(void **state)
 {
     (void)state;
     static const char *const rows[][2] = {
-        {"{position: [0, 0, 0]}",                                                             "light 'k' needs 'type': point, spot or directional"                       },
-        {"{type: sphere}",                                                                    "'type': 'sphere' is not one of its words; known: directional, point, spot"},
-        {"{type: point, intensity: 1}",                                                       "light 'k': a point light needs 'position'"                                },
-        {"{type: point, position: [0, 0, 0]}",                                                "light 'k' needs intensity, candela or lumen"                              },
+        {"{position: [0, 0, 0]}",                                                             "light 'k' needs 'type': point, spot or directional"                },
+        {"{type: sphere}",                                                                    "'type': there is no word 'sphere'; known: directional, point, spot"},
+        {"{type: point, intensity: 1}",                                                       "light 'k': a point light needs 'position'"                         },
+        {"{type: point, position: [0, 0, 0]}",                                                "light 'k' needs intensity, candela or lumen"                       },
         {"{type: point, position: [0, 0, 0], lux: 3}",
-         "light 'k': a point light takes intensity, candela or lumen, not lux"                                                                                           },
+         "light 'k': a point light takes intensity, candela or lumen, not lux"                                                                                    },
         {"{type: point, position: [0, 0, 0], lumen: 3, candela: 2}",
-         "light 'k' has both candela and lumen; give one"                                                                                                                },
-        {"{type: point, position: [0, 0, 0], intensity: -1}",                                 "'intensity' is -1: out of range, at least 0"                              },
+         "light 'k' has both candela and lumen; give one"                                                                                                         },
+        {"{type: point, position: [0, 0, 0], intensity: -1}",                                 "'intensity' is -1: out of range, at least 0"                       },
         {"{type: point, position: [0, 0, 0], intensity: [1, 2]}",
-         "'intensity': expected a number or a list of 3 numbers, found a list of 2"                                                                                      },
+         "'intensity': expected a number or a list of 3 numbers, found a list of 2"                                                                               },
         {"{type: point, position: [0, 0, 0], intensity: .inf}",
-         "'intensity' is .inf: a finite number is needed"                                                                                                                },
+         "'intensity' is .inf: a finite number is needed"                                                                                                         },
         {"{type: point, position: [0, 0, 0], intensity: 1, angle: 3}",
-         "light 'k': a point light has no 'angle'"                                                                                                                       },
+         "light 'k': a point light has no 'angle'"                                                                                                                },
         {"{type: point, position: [0, 0, 0], intensity: 1, direction: [0, 0, 1]}",
-         "light 'k': a point light has no 'direction'"                                                                                                                   },
+         "light 'k': a point light has no 'direction'"                                                                                                            },
         {"{type: directional, direction: [0, 0, 0], lux: 1}",
-         "light 'k': the direction has no usable length"                                                                                                                 },
+         "light 'k': the direction has no usable length"                                                                                                          },
         {"{type: spot, position: [0, 0, 0], direction: [0, 0, 1], intensity: 1}",
-         "light 'k': a spot light needs 'angle' (full, degrees)"                                                                                                         },
+         "light 'k': a spot light needs 'angle' (full, degrees)"                                                                                                  },
         {"{type: spot, position: [0, 0, 0], direction: [0, 0, 1], angle: 180, intensity: 1}",
-         "'angle' is 180: out of range, 0.01 to 179.9"                                                                                                                   },
+         "'angle' is 180: out of range, 0.01 to 179.9"                                                                                                            },
         {"{type: point, positon: [0, 0, 0]}",                                                 "light 'k' has no key 'positon'; did you mean 'position'? "
-         "known: angle, blend, candela, color, colorspace, "
+                                              "known: angle, blend, candela, color, colorspace, "
                                               "direction, efficacy, enabled, exposure, intensity, "
-                                              "irradiance, lumen, lux, position, shadow, space, type"                                                                                                                            },
-        {"bright",                                                                                   "light 'k': expected a map, found the text 'bright'"                          },
+                                              "irradiance, lumen, lux, position, shadow, space, type"                },
+        {"bright",                                                                            "light 'k': expected a map, found the text 'bright'"                },
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         rl_manifest *m;
@@ -663,6 +676,37 @@ static void test_bare_file(void **state)
         "geo:albedo.G (set layers.normal in capture.yaml)");
 }
 
+/* Damaged manifests give an error or a manifest, and never a crash (run under ASan). */
+static void test_damage(void **state)
+{
+    (void)state;
+    static const char alphabet[] = " \n:,-[]{}#\"'*&!0123456789.eabcxyz_~";
+    unsigned random = 7;
+    int good = 0;
+    for (int i = 0; i < 4000; i++) {
+        char text[sizeof whole];
+        rl_manifest *m;
+        memcpy(text, whole, sizeof whole);
+        for (int k = 0; k < 1 + i % 3; k++) {
+            random = random * 1664525u + 1013904223u;
+            text[(random >> 8) % (sizeof whole - 1)] = alphabet[(random >> 3) % (sizeof alphabet - 1)];
+        }
+        rl_code code = try_parse(text, &m);
+        assert_int_equal(code, err.code);
+        assert_true((code == RL_OK) == (m != NULL));
+        if (m) {
+            rl_str s = {0};
+            rl_manifest_print(m, &s);
+            rl_str_free(&s);
+            good++;
+        } else {
+            assert_true(err.line > 0 && err.text[0]);
+        }
+        rl_arena_free(&arena);
+    }
+    assert_true(good > 100);
+}
+
 static void test_failing_memory(void **state)
 {
     (void)state;
@@ -709,7 +753,7 @@ int main(void)
         T(test_bad),       T(test_bad_layers),       T(test_depth),
         T(test_camera),    F(test_found_frames),     T(test_names_from_files),
         T(test_lights),    T(test_bad_lights),       T(test_preset_binds),
-        T(test_bare_file), T(test_failing_memory),
+        T(test_bare_file), T(test_damage),           T(test_failing_memory),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
