@@ -479,7 +479,7 @@ static void test_print_round_trip(void **state)
         "{plain: lin_rec709, path: \"../a/b-c.exr\", q: \"true\", n: \"12\", e: \"\", "
         "s: \"a \\\"b\\\"\\x0a\\\\\\x01\", u: \"\xC3\xA9\", \"1\": skin, d: [0.1, 1e10, 100, -3, 16, "
         ".inf, -.inf, .nan, 1e-5, 250000, 3], t: true, z: null, m: {}, l: [], \"k: v\": \"-\", "
-        "star: \"*x\", hash: \"a#b\"}");
+        "star: \"*x\", hash: a#b}");
     const rl_value *back = parse(rl_str_text(&once));
     rl_value_print(back, &twice);
     assert_string_equal(rl_str_text(&once), rl_str_text(&twice));
@@ -583,9 +583,8 @@ static void test_other_scalars(void **state)
     assert_int_equal(rl_value_word(parse("device"), "kind", "planar|radial|device", &w, &err), RL_OK);
     assert_int_equal(w, 2);
     rl_value_word(parse("radia"), "kind", "planar|radial|device", &w, &err);
-    assert_message(
-        "t.yaml:1:1: error: 'kind': 'radia' is not one of its words; did you mean 'radial'? known: "
-        "device, planar, radial");
+    assert_message("t.yaml:1:1: error: 'kind': there is no word 'radia'; did you mean 'radial'? known: "
+                   "device, planar, radial");
     rl_value_word(parse("[a]"), "kind", "planar|radial", &w, &err);
     assert_message("t.yaml:1:1: error: 'kind': expected one of planar|radial, found a list of 1");
     assert_int_equal(w, 2);

@@ -141,7 +141,7 @@ void rl_frames_print(const rl_frames *frames, rl_str *out)
         long long step = i + 1 < frames->n ? (long long)f[i + 1] - f[i] : 0;
         while (last + 1 < frames->n && (long long)f[last + 1] - f[last] == step)
             last++;
-        if (last < i + 2)
+        if (last < i + (step > 1 ? 3 : 2)) /* 1,5,9 says more than 1-9x4 */
             last = i;
         rl_str_printf(out, "%s%d", i ? "," : "", f[i]);
         if (last > i)

@@ -34,7 +34,8 @@ long rl_frames_find(const rl_frames *frames, int number);
 /* All of `wanted` are in `listed`, else RL_E_USAGE that names the first that is not, and what there is. */
 rl_code rl_frames_check(const rl_frames *listed, const rl_frames *wanted, rl_where where, rl_error *err);
 
-/* Adds the shortest spec that this module writes: runs of three or more with one step become ranges. */
+/* Adds a spec that reads back as the same set: three or more in a row, or four or more of one step, as a
+ * range. */
 void rl_frames_print(const rl_frames *frames, rl_str *out);
 
 #ifdef __cplusplus

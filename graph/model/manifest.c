@@ -222,7 +222,7 @@ rl_code rl_manifest_bare(rl_arena *arena, const char *files, const char *preset,
         return rl_fail_memory(err, sizeof *map);
     const char *name = rl_path_name(files);
     const char *last = name + strlen(name) - strlen(rl_path_extension(files)), *digits = last;
-    while (digits > name && isdigit((unsigned char)digits[-1]))
+    while (digits > name && last - digits < 9 && isdigit((unsigned char)digits[-1]))
         digits--;
     rl_where where = {.file = rl_arena_strdup(arena, files)};
     char *number = rl_arena_strndup(arena, digits, (size_t)(last - digits));

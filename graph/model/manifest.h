@@ -169,9 +169,10 @@ char *rl_manifest_path(rl_arena *arena, const rl_manifest *m, const rl_layer *la
 
 /* World to view of a frame as the kernels want it: 3 rows of 4, column vectors, metres, looking down -z.
  * `header` is the file's worldToCamera (16 floats as stored), NULL when it has none: then an error if the
- * manifest wants it. `frame` must be in m->frames. */
+ * manifest wants it. A matrix that does more than rotate, mirror and shift is an error: relit measures
+ * lengths in view space. `frame` must be in m->frames. */
 rl_code rl_manifest_view(const rl_manifest *m, int frame, const float *header, double out[12], rl_error *err);
-/* NULL when the header is to be asked. */
+/* Radians, and pixels (x right, y down); NULL when the header is to be asked. */
 const double *rl_manifest_fov_x(const rl_manifest *m, int frame);
 const double *rl_manifest_jitter(const rl_manifest *m, int frame);
 

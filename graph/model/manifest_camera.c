@@ -3,6 +3,7 @@
 
 #include <float.h>
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 static bool is_header(const rl_value *v)
@@ -10,24 +11,24 @@ static bool is_header(const rl_value *v)
     return !v || (v->kind == RL_TEXT && !strcmp(v->text, "header"));
 }
 
-/* Finite, affine, and a rotation (or mirror) with a shift: relit measures lengths in view space, so a scale
- * in the matrix would scale them. */
-static rl_code check_matrix(const rl_value *v, const double *m, rl_error *err)
+/* Affine, and a rotation (or mirror) with a shift: relit measures lengths in view space, so a scale in the
+ * matrix would scale them. `what` names the matrix. */
+static rl_code check_matrix(const double *m, rl_where where, const char *what, rl_code code, rl_error *err)
 {
     if (m[12] != 0 || m[13] != 0 || m[14] != 0 || m[15] != 1)
         return rl_fail(
-            err, RL_E_CONFIG, v->where,
-            "'matrix': the last row must be 0, 0, 0, 1 (rows listed, for column vectors; a matrix for row "
-            "vectors is the transpose)");
+            err, code, where,
+            "%s: the last row must be 0, 0, 0, 1 (rows listed, for column vectors; a matrix for row "
+            "vectors is the transpose)",
+            what);
     for (int i = 0; i < 3; i++) {
         for (int k = i; k < 3; k++) {
             double dot = m[4 * i] * m[4 * k] + m[4 * i + 1] * m[4 * k + 1] + m[4 * i + 2] * m[4 * k + 2];
-            if (fabs(dot - (i == k)) > 1e-3)
+            if (!(fabs(dot - (i == k)) <= 1e-3))
                 return rl_fail(
-                    err, RL_E_CONFIG, v->where,
-                    "'matrix' must rotate and shift only: rows %d and %d of its 3x3 have the dot product "
-                    "%.6g",
-                    i + 1, k + 1, dot);
+                    err, code, where,
+                    "%s must rotate and shift only: rows %d and %d of its 3x3 have the dot product %.6g",
+                    what, i + 1, k + 1, dot);
         }
     }
     return RL_OK;
@@ -50,7 +51,7 @@ static rl_code read_matrix(rl_manifest_reader *r, const rl_value *v)
         const rl_value *one = list ? v->items[i] : v;
         code = rl_value_numbers(one, "matrix", 16, c->matrix[i], r->err);
         if (!code)
-            code = check_matrix(one, c->matrix[i], r->err);
+            code = check_matrix(c->matrix[i], one->where, "'matrix'", RL_E_CONFIG, r->err);
     }
     c->matrix_source = list ? RL_SOURCE_LIST : RL_SOURCE_ONE;
     c->n_matrix = n;
@@ -136,13 +137,17 @@ rl_code rl_manifest_view(const rl_manifest *m, int frame, const float *header, d
     for (int i = 0; i < 16; i++) /* the header's is for row vectors: its transpose */
         w[i] = c->matrix_source == RL_SOURCE_HEADER ? (double)header[4 * (i % 4) + i / 4]
                                                     : c->matrix[element(m, c->matrix_source, frame)][i];
-    for (int i = 0; i < 12; i++) {
+    char what[80];
+    snprintf(what, sizeof what, "frame %d: worldToCamera (as column vectors)", frame);
+    rl_code code = check_matrix(w, c->where, what, RL_E_FORMAT, err);
+    for (int i = 0; i < 12 && !code; i++) {
         bool shift = i % 4 == 3, mirrored = c->forward_z && i >= 8; /* view looks down -z */
         out[i] = w[i] * (shift ? m->unit : 1) * (mirrored ? -1 : 1);
         if (!isfinite(out[i]))
-            return rl_fail(err, RL_E_FORMAT, c->where, "frame %d: the camera's matrix is not finite", frame);
+            code =
+                rl_fail(err, RL_E_FORMAT, c->where, "frame %d: the camera's position is not finite", frame);
     }
-    return RL_OK;
+    return code;
 }
 
 const double *rl_manifest_fov_x(const rl_manifest *m, int frame)

@@ -119,12 +119,8 @@ static rl_code unknown_layer(rl_manifest_reader *r, const rl_entry *e)
     for (int i = 0; i < m->n_layers; i++)
         names[i] = m->layers[i].name;
     names[m->n_layers] = "default";
-    rl_str text = {0};
-    rl_str_printf(&text, "files: the capture has no layer '%s'", e->key);
-    rl_suggest(&text, e->key, names, (size_t)m->n_layers + 1, "known");
-    rl_code code = rl_fail(r->err, RL_E_CONFIG, e->where, "%s", rl_str_text(&text));
-    rl_str_free(&text);
-    return code;
+    return rl_fail_unknown(r->err, e->where, "files: the capture has no layer", e->key, names,
+                           (size_t)m->n_layers + 1);
 }
 
 static rl_code read_file_map(rl_manifest_reader *r, const rl_value *v)

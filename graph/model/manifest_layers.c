@@ -255,12 +255,7 @@ static rl_code find_type(rl_manifest_reader *r, const rl_entry *e, rl_layer_id *
             return RL_OK;
         }
     }
-    rl_str text = {0};
-    rl_str_printf(&text, "there is no layer '%s'", e->key);
-    rl_suggest(&text, e->key, names, RL_LAYER_COUNT, "known");
-    rl_code code = rl_fail(r->err, RL_E_CONFIG, e->where, "%s", rl_str_text(&text));
-    rl_str_free(&text);
-    return code;
+    return rl_fail_unknown(r->err, e->where, "there is no layer", e->key, names, RL_LAYER_COUNT);
 }
 
 rl_code rl_manifest_read_layers(rl_manifest_reader *r, const rl_value *v)

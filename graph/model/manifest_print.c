@@ -94,12 +94,26 @@ static void print_channels(const rl_layer *l, rl_str *s)
     rl_str_add(s, l->n_alternatives > 1 ? "]]" : "]");
 }
 
+/* Lengths may have a unit of their own. */
+static bool has_unit(rl_layer_id id)
+{
+    for (const char *const *key = rl_layer_types[id].keys; *key; key++)
+        if (!strcmp(*key, "unit"))
+            return true;
+    return false;
+}
+
 static void print_layer(const rl_manifest *m, const rl_layer *l, rl_str *s)
 {
     static const char *const encodings[] = {"signed", "unsigned", "octahedral"};
     static const char *const motions[] = {"pixels", "uv", "ndc"};
     const rl_format format = rl_layer_types[l->id].format;
     double scale = l->id == RL_LAYER_CURVATURE ? 1 / l->scale : l->scale;
+    if (l->light && l->n_alternatives == 1 && !l->part && !l->remapped &&
+        (l->id == RL_LAYER_SHADOW || scale == m->unit)) {
+        print_text(s, l->channels[0]);
+        return;
+    }
     rl_str_add(s, "{channels: ");
     print_channels(l, s);
     if (l->part) {
@@ -118,7 +132,7 @@ static void print_layer(const rl_manifest *m, const rl_layer *l, rl_str *s)
     if (l->id == RL_LAYER_MOTION)
         rl_str_printf(s, ", unit: %s, points: %s, y: %s", motions[l->motion_unit],
                       l->points_next ? "next" : "previous", l->y_up ? "up" : "down");
-    else if (scale != m->unit) {
+    else if (has_unit(l->id) && scale != m->unit) {
         rl_str_add(s, ", unit: ");
         print_number(s, scale);
     }

@@ -250,14 +250,7 @@ static rl_code unknown_preset(rl_arena *arena, const char *presets, const char *
     const char *names[256];
     size_t n;
     rl_code code = list_presets(arena, presets, names, &n, err);
-    if (code)
-        return code;
-    rl_str text = {0};
-    rl_str_printf(&text, "there is no preset '%s'", name);
-    rl_suggest(&text, name, names, n, "known");
-    code = rl_fail(err, RL_E_CONFIG, where, "%s", rl_str_text(&text));
-    rl_str_free(&text);
-    return code;
+    return code ? code : rl_fail_unknown(err, where, "there is no preset", name, names, n);
 }
 
 rl_code rl_preset_load(rl_arena *arena, const char *presets, const char *name, rl_where where, rl_value **out,

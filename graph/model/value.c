@@ -73,7 +73,7 @@ char *rl_value_path(rl_arena *arena, const rl_value *v)
 static bool is_plain(const rl_value *v)
 {
     static const char letters[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ_";
-    static const char others[] = "0123456789./-";
+    static const char others[] = "0123456789./-#%";
     static const char *const taken[] = {"null", "Null",  "NULL",  "true", "True",
                                         "TRUE", "false", "False", "FALSE"};
     const char *t = v->text;

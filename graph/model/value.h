@@ -83,6 +83,10 @@ rl_code rl_value_set(rl_arena *arena, rl_value **root, const char *path, rl_valu
  * 'x'; did you mean 'y'? known: …". v must be a map (an error says what was found). */
 rl_code rl_value_keys(const rl_value *v, const char *what, const char *const *known, size_t n, rl_error *err);
 
+/* "<head> 'name'; did you mean 'y'? known: …", e.g. head "pass 'sss' (sss_burley) has no parameter". */
+rl_code rl_fail_unknown(rl_error *err, rl_where where, const char *head, const char *name, const char *const *known,
+                        size_t n);
+
 /* "expected <expected>, found <describe>" at the place of v, with `name` in front: "'fov_x': expected …". */
 rl_code rl_value_wrong(const rl_value *v, const char *name, const char *expected, rl_error *err);
 

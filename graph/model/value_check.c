@@ -21,14 +21,15 @@ rl_code rl_value_wrong(const rl_value *v, const char *name, const char *expected
                    rl_value_describe(v, buf));
 }
 
-/* Fails with "<head>" and the suggestions for `name` among the candidates behind it. */
-static rl_code fail_with_suggestion(rl_where where, rl_str *head, const char *name, const char *const *known,
-                                    size_t n, rl_error *err)
+rl_code rl_fail_unknown(rl_error *err, rl_where where, const char *head, const char *name,
+                        const char *const *known, size_t n)
 {
-    rl_suggest(head, name, known, n, "known");
-    rl_code code = head->failed ? rl_fail_memory(err, head->room)
-                                : rl_fail(err, RL_E_CONFIG, where, "%s", rl_str_text(head));
-    rl_str_free(head);
+    rl_str text = {0};
+    rl_str_printf(&text, "%s '%s'", head, name);
+    rl_suggest(&text, name, known, n, "known");
+    rl_code code = text.failed ? rl_fail_memory(err, text.room)
+                               : rl_fail(err, RL_E_CONFIG, where, "%s", rl_str_text(&text));
+    rl_str_free(&text);
     return code;
 }
 
@@ -45,9 +46,12 @@ rl_code rl_value_keys(const rl_value *v, const char *what, const char *const *kn
             found = !strcmp(e->key, known[k]);
         if (found)
             continue;
-        rl_str text = {0};
-        rl_str_printf(&text, "%s has no key '%s'", what, e->key);
-        return fail_with_suggestion(e->where, &text, e->key, known, n, err);
+        rl_str head = {0};
+        rl_str_printf(&head, "%s has no key", what);
+        rl_code code = head.failed ? rl_fail_memory(err, head.room)
+                                   : rl_fail_unknown(err, e->where, rl_str_text(&head), e->key, known, n);
+        rl_str_free(&head);
+        return code;
     }
     return RL_OK;
 }
@@ -144,9 +148,11 @@ static rl_code unknown_word(const rl_value *v, const char *name, const char *wor
         return rl_fail_memory(err, strlen(words) + 1);
     for (char *w = strtok_r(copy, "|", &rest); w && n < MOST; w = strtok_r(NULL, "|", &rest))
         known[n++] = w;
-    rl_str text = {0};
-    rl_str_printf(&text, "'%s': '%s' is not one of its words", name, v->text);
-    rl_code code = fail_with_suggestion(v->where, &text, v->text, known, n, err);
+    rl_str head = {0};
+    rl_str_printf(&head, "'%s': there is no word", name);
+    rl_code code = head.failed ? rl_fail_memory(err, head.room)
+                               : rl_fail_unknown(err, v->where, rl_str_text(&head), v->text, known, n);
+    rl_str_free(&head);
     rl_free(copy);
     return code;
 }
