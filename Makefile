@@ -25,7 +25,7 @@ LIB_O   := $(LIB_C:%.c=$(BUILD)/%.o) $(LIB_CXX:%.cc=$(BUILD)/%.o) $(BUILD)/kerne
 TOOL_O  := $(TOOL_C:%.c=$(BUILD)/%.o)
 LIBS    = $(shell pkg-config --libs $(PKGS)) $(shell pkg-config --libs OpenColorIO) -lOpenCL -lstdc++ -ldl -lm
 TESTS   := $(patsubst tests/%.c,$(BUILD)/tests/%,$(wildcard tests/test_*.c))
-TEST_HELP_O := $(patsubst tests/%.c,$(BUILD)/tests/%.o,$(filter-out tests/test_%.c,$(wildcard tests/*.c)))
+TEST_HELP_O := $(patsubst tests/%.c,$(BUILD)/tests/%.o,$(filter-out tests/test_%.c tests/bench_%.c,$(wildcard tests/*.c)))
 
 all: $(BUILD)/relit $(BUILD)/librelit.a
 
