@@ -41,10 +41,15 @@ $(BUILD)/librelit.a: $(LIB_O)
 	@rm -f $@
 	ar rcs $@ $^
 
-$(BUILD)/relit: $(TOOL_O) $(BUILD)/librelit.a
+# All of the tool but main(): tests call it in their own process.
+$(BUILD)/tool.a: $(filter-out $(BUILD)/graph/tool/relit.o,$(TOOL_O))
+	@rm -f $@
+	ar rcs $@ $^
+
+$(BUILD)/relit: $(BUILD)/graph/tool/relit.o $(BUILD)/tool.a $(BUILD)/librelit.a
 	$(CC) $(LDFLAGS) -o $@ $^ $(LIBS)
 
-$(BUILD)/tests/%: $(BUILD)/tests/%.o $(TEST_HELP_O) $(BUILD)/librelit.a
+$(BUILD)/tests/%: $(BUILD)/tests/%.o $(TEST_HELP_O) $(BUILD)/tool.a $(BUILD)/librelit.a
 	$(CC) $(LDFLAGS) -o $@ $^ $(LIBS) -lcmocka
 
 .SECONDARY:
