@@ -154,6 +154,36 @@ static inline float rl_max_lane(floatv v)
     return m;
 }
 
+/* Whether any lane is set; a uniform answer, cheap enough to leave a branch early. */
+static inline int rl_any(intv mask)
+{
+#if RL_W == 16
+    int8 a = mask.lo | mask.hi;
+    int4 b = a.lo | a.hi;
+#elif RL_W == 8
+    int4 b = mask.lo | mask.hi;
+#else
+    int4 b = mask;
+#endif
+    int2 c = b.lo | b.hi;
+    return (c.x | c.y) != 0;
+}
+
+/* The largest id of a vector. */
+static inline uint rl_max_id(uintv v)
+{
+#if RL_W == 16
+    uint8 a = max(v.lo, v.hi);
+    uint4 b = max(a.lo, a.hi);
+#elif RL_W == 8
+    uint4 b = max(v.lo, v.hi);
+#else
+    uint4 b = v;
+#endif
+    uint2 c = max(b.lo, b.hi);
+    return max(c.x, c.y);
+}
+
 /* ---- camera ----------------------------------------------------------------------------------------------- */
 
 /* Metres on the plane z = -1 for pixel x (buffer coordinates), jitter included; y alike, up positive. */

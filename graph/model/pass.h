@@ -38,50 +38,39 @@ typedef enum rl_type {
 
 /* A row of a table of parameters, or of profile, material or shading keys. */
 typedef struct rl_param {
-    const char *name; /* as in YAML and, the same, as a field of the struct */
+    const char *name;    /* as in YAML and, the same, as a field of the struct */
     rl_type type;
-    size_t offset;      /* in the pass's own struct; not used by rows of materials and profiles */
-    double min, max;    /* inclusive, compared in double before narrowing */
-    double def[3];      /* default; RL_ENUM and RL_I32 words: the value they stand for */
-    const char *words;  /* "screen|tangent", for RL_ENUM and RL_I32; else NULL */
-    const char *unit;   /* "ratio", "mm", "stops", "" */
-    const char *help;   /* one line, lower case, no full stop */
-    const char *source; /* where the idea is from, or NULL */
-    bool structural;    /* a #define P_NAME for the program, since the code itself depends on it */
-    bool required;      /* profile rows: every profile that a material uses must give it */
+    size_t offset;       /* in the pass's own struct; not used by rows of materials and profiles */
+    double min, max;     /* inclusive, compared in double before narrowing */
+    double def[3];       /* default; RL_ENUM and RL_I32 words: the value they stand for */
+    const char *words;   /* "screen|tangent", for RL_ENUM and RL_I32; else NULL */
+    const char *unit;    /* "ratio", "mm", "stops", "" */
+    const char *help;    /* one line, lower case, no full stop */
+    const char *source;  /* where the idea is from, or NULL */
+    bool structural;     /* a #define P_NAME for the program, since the code itself depends on it */
+    bool required;       /* profile rows: every profile that a material uses must give it */
+    bool optional;       /* material rows: the default (-1 as a rule) lies outside of the range and says "not given" */
 } rl_param;
 
 #define RL_ARRAY_LENGTH(a) (sizeof(a) / sizeof *(a))
 /* A designated pair: `.params = RL_ARRAY(params)` fills rows and n. */
-#define RL_ARRAY(a)                                                                                          \
-    {                                                                                                        \
-        (a), RL_ARRAY_LENGTH(a)                                                                              \
-    }
+#define RL_ARRAY(a) {(a), RL_ARRAY_LENGTH(a)}
 
-/* The last argument is the help, more fields may follow it. A row of a pass's struct: P(taa_params, RL_F32,
- * blend, 0, 1, 0.05, "ratio", "least weight …", .source = …) */
-#define P(struct_, type_, field, min_, max_, def_, unit_, ...)                                               \
-    {                                                                                                        \
-        .name = #field, .type = (type_), .offset = offsetof(struct_, field), .min = (min_), .max = (max_),   \
-        .def = {(def_), (def_), (def_)}, .unit = (unit_), .help = __VA_ARGS__                                \
-    }
+/* The last argument is the help, more fields may follow it. A row of a pass's struct: P(taa_params, RL_F32, blend, 0, 1, 0.05, "ratio", "least weight …", .source = …) */
+#define P(struct_, type_, field, min_, max_, def_, unit_, ...)                                        \
+    {.name = #field, .type = (type_), .offset = offsetof(struct_, field), .min = (min_), .max = (max_),      \
+     .def = {(def_), (def_), (def_)}, .unit = (unit_), .help = __VA_ARGS__}
 /* The same for one of a list of words; def_ is the index of the default. */
-#define P_ENUM(struct_, field, words_, def_, ...)                                                            \
-    {                                                                                                        \
-        .name = #field, .type = RL_ENUM, .offset = offsetof(struct_, field), .min = 0, .max = 1e9,           \
-        .def = {(def_), (def_), (def_)}, .words = (words_), .unit = "", .help = __VA_ARGS__                  \
-    }
+#define P_ENUM(struct_, field, words_, def_, ...)                                                     \
+    {.name = #field, .type = RL_ENUM, .offset = offsetof(struct_, field), .min = 0, .max = 1e9,              \
+     .def = {(def_), (def_), (def_)}, .words = (words_), .unit = "", .help = __VA_ARGS__}
 /* Rows of the material table (profile, material, shading keys): no struct on the host. */
-#define M(type_, field, min_, max_, def_, unit_, ...)                                                        \
-    {                                                                                                        \
-        .name = #field, .type = (type_), .min = (min_), .max = (max_), .def = {(def_), (def_), (def_)},      \
-        .unit = (unit_), .help = __VA_ARGS__                                                                 \
-    }
-#define M_ENUM(field, words_, def_, ...)                                                                     \
-    {                                                                                                        \
-        .name = #field, .type = RL_ENUM, .min = 0, .max = 1e9, .def = {(def_), (def_), (def_)},              \
-        .words = (words_), .unit = "", .help = __VA_ARGS__                                                   \
-    }
+#define M(type_, field, min_, max_, def_, unit_, ...)                                                 \
+    {.name = #field, .type = (type_), .min = (min_), .max = (max_), .def = {(def_), (def_), (def_)},         \
+     .unit = (unit_), .help = __VA_ARGS__}
+#define M_ENUM(field, words_, def_, ...)                                                              \
+    {.name = #field, .type = RL_ENUM, .min = 0, .max = 1e9, .def = {(def_), (def_), (def_)},                 \
+     .words = (words_), .unit = "", .help = __VA_ARGS__}
 
 #define RL_PARAM_BYTES(type) ((type) == RL_RGBF ? 12u : 4u)
 
@@ -105,8 +94,7 @@ typedef enum rl_format {
     RL_VEC2,   /* 2 planes: X Y */
     RL_SCALAR, /* 1 plane */
     RL_ID,     /* 1 plane of uint: dense stencil index, 0 = no material */
-    RL_LIGHTS, /* a plane for each light that has the layer, in the order of the lights (light_t says which)
-                */
+    RL_LIGHTS, /* a plane for each light that has the layer, in the order of the lights (light_t says which) */
 } rl_format;
 
 typedef enum rl_layout {
@@ -119,10 +107,10 @@ typedef struct rl_port {
     rl_role role;
     rl_format format;
     const char *help;
-    bool optional;    /* READ: may be absent; the kernel sees NULL and HAS_NAME 0 */
-    const char *of;   /* HISTORY: the port (own output first, else own input) whose past this is */
-    rl_layout layout; /* the layout that the kernel wants; the plan inserts the conversion */
-    bool any_layout;  /* WRITE: the kernel stores through RL_STORE, so the plan may choose (LAYOUT_NAME) */
+    bool optional;     /* READ: may be absent; the kernel sees NULL and HAS_NAME 0 */
+    const char *of;    /* HISTORY: the port (own output first, else own input) whose past this is */
+    rl_layout layout;  /* the layout that the kernel wants; the plan inserts the conversion */
+    bool any_layout;   /* WRITE: the kernel stores through RL_STORE, so the plan may choose (LAYOUT_NAME) */
 } rl_port;
 
 /* ---- steps --------------------------------------------------------------------------------------------- */
@@ -130,8 +118,7 @@ typedef struct rl_port {
 typedef enum rl_domain {
     RL_EVERY_PIXEL,  /* an item a pixel: get_global_id(0) = x, (1) = y, buffer coordinates */
     RL_EVERY_VECTOR, /* an item RL_W pixels of a row: x = RL_W*get_global_id(0), y = (1) */
-    RL_EVERY_PHASE,  /* an item RL_W pixels of one sub-image of RL_PHASE4: (0) = phase, (1) = vector, (2) =
-                        sub-row */
+    RL_EVERY_PHASE,  /* an item RL_W pixels of one sub-image of RL_PHASE4: (0) = phase, (1) = vector, (2) = sub-row */
 } rl_domain;
 
 typedef struct rl_step {
@@ -143,8 +130,9 @@ typedef struct rl_step {
 
 /* What the host-side hook of a pass may read. */
 typedef struct rl_pass_input {
-    const void *params;                   /* the pass's struct */
-    const struct rl_materials *materials; /* resolved; read with rl_material_* below */
+    const struct rl_pass *pass;            /* the pass itself, for its .data */
+    const void *params;                    /* the pass's struct */
+    const struct rl_materials *materials;  /* resolved; read with rl_material_* below */
 } rl_pass_input;
 
 typedef struct rl_tables {
@@ -154,11 +142,11 @@ typedef struct rl_tables {
 
 typedef struct rl_pass {
     const char *name;
-    const char *help;   /* one line */
-    const char *source; /* paper, talk, equation */
-    const char *kernel; /* file in kernels/, or NULL when kernel_text is set */
-    const char
-        *kernel_text; /* the program itself, for passes built at run time; named kernel_file in errors */
+    const char *help;        /* one line */
+    const char *source;      /* paper, talk, equation */
+    const char *kernel;      /* file in kernels/, or NULL when kernel_text is set */
+    const char *kernel_prelude; /* another file in kernels/, put in front of it; NULL = none */
+    const char *kernel_text; /* the program itself, for passes built at run time; named kernel_file in errors */
     const char *kernel_file;
     rl_params params;
     size_t params_size; /* sizeof the pass's struct; RL_PARAMS_MATCH proves it equal to the table */
@@ -174,14 +162,14 @@ typedef struct rl_pass {
     bool lights; /* the kernel gets the lights, and the run the shadow layers that they use */
     /* Computes constant tables from parameters and materials, in double, into `arena`; NULL = none. Pure. */
     rl_code (*tables)(const rl_pass_input *in, rl_arena *arena, rl_tables *out, rl_error *err);
+    const void *data; /* for .tables of a pass that is built at run time; the engine does not look at it */
 } rl_pass;
 
 /* The struct holds the table's 4-byte fields and nothing else; RGB rows count three. */
 #define RL_PARAMS_MATCH(struct_, scalars)                                                                    \
     _Static_assert(sizeof(struct_) == 4 * (scalars), #struct_ " does not match its table of parameters")
 
-/* ---- materials, as passes read them ----------------------------------------------------------------------
- */
+/* ---- materials, as passes read them ---------------------------------------------------------------------- */
 
 /* Number of entries, the empty one (index 0) included. */
 size_t rl_material_count(const struct rl_materials *m);
@@ -191,8 +179,7 @@ bool rl_material_has_profile(const struct rl_materials *m, size_t material);
 bool rl_material_get(const struct rl_materials *m, size_t material, const char *group, const char *key,
                      double out[3]);
 
-/* ---- the registry (graph/model/registry.c: one line a pass) ----------------------------------------------
- */
+/* ---- the registry (graph/model/registry.c: one line a pass) ---------------------------------------------- */
 
 size_t rl_pass_count(void);
 const rl_pass *rl_pass_at(size_t i);

@@ -5,6 +5,7 @@
 
 #include "graph/base/log.h"
 #include "graph/model/pass.h"
+#include "graph/model/registry.h"
 #include "graph/model/value.h"
 
 #ifdef __cplusplus
@@ -52,10 +53,12 @@ typedef struct rl_output {
     int level;               /* zip level, 0 = default */
 } rl_output;
 
+/* Constant after rl_pipeline_parse. Lives in the arena that was given, and points into the tree: both must
+ * outlive it. */
 typedef struct rl_pipeline {
     const char *file;        /* as given on the command line */
     const char *name;        /* file name without folder and extension */
-    unsigned long long hash; /* of the merged content (include and --set applied): relit:pipeline */
+    unsigned long long hash; /* XXH3 of the merged content (includes, --set) and of user kernels' files */
     const rl_value *root;    /* merged; the parts below point into it */
     const rl_value *capture; /* a path (text) or an inline manifest (map); NULL = must come from --capture */
     const char *ocio_config; /* path resolved against the file that names it, or NULL */
@@ -75,8 +78,17 @@ typedef struct rl_pipeline {
 rl_code rl_pipeline_parse(rl_arena *arena, const char *file, rl_value *root, const rl_log *log,
                           const rl_pipeline **out, rl_error *err);
 
+/* The same with other passes than the build's. */
+rl_code rl_pipeline_parse_from(const rl_registry *registry, rl_arena *arena, const char *file, rl_value *root,
+                               const rl_log *log, const rl_pipeline **out, rl_error *err);
+
+/* The path that a text value names: relative to the file that holds the value, or as it is when the value
+ * comes from the command line ("--set …"). NULL when memory is out. */
+const char *rl_value_path(rl_arena *arena, const rl_value *v);
+
 /* Expands {capture}, {frame:04}, {variant} and such in an output's file pattern; unknown names are an error.
- */
+ * {frame} is printf's %lld, {frame:04} %04lld. capture and variant may be NULL where there is none: a pattern
+ * that asks for it is an error. */
 rl_code rl_output_path(rl_arena *arena, const rl_output *output, const char *capture, long long frame,
                        const char *variant, const char **out, rl_error *err);
 
