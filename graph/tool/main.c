@@ -11,23 +11,23 @@ static const command commands[] = {
     {{"run", RL_CMD_RUN, "PIPELINE", "process frames",
       "Reads the frames of the pipeline's capture, runs its graph and writes its outputs.\n"
       "A file under its final name is whole. A frame that fails does not stop the others.\n"},
-     rl_cmd_run    },
+     rl_cmd_run},
     {{"check", RL_CMD_CHECK, "PIPELINE", "validate everything without processing a pixel",
       "Reads the pipeline, opens the headers of the capture, makes the plan and compiles the\n"
       "kernels. Writes nothing.\n"},
-     rl_cmd_check  },
+     rl_cmd_check},
     {{"plan", RL_CMD_PLAN, "PIPELINE", "show the graph: order, lifetimes, memory, culled passes", NULL},
-     rl_cmd_plan   },
+     rl_cmd_plan},
     {{"init", RL_CMD_INIT, "CAPTURE", "print a starter pipeline for a capture",
       "CAPTURE is a capture.yaml, a folder that holds one, or an EXR file or pattern.\n"
       "The pipeline has the capture's lights and materials, and the standard graph:\n"
       "    relit init captures/monkey > monkey.yaml && relit run monkey.yaml\n"
       "Paths in it are relative to the working folder: keep it there, or edit them.\n"},
-     rl_cmd_init   },
+     rl_cmd_init},
     {{"inspect", RL_CMD_INSPECT, "FILE|DIR", "show parts, channels, metadata, guessed capture mapping", NULL},
      rl_cmd_inspect},
     {{"passes", RL_CMD_PASSES, "[NAME]", "list the passes, or one's ports and parameters", NULL},
-     rl_cmd_passes },
+     rl_cmd_passes},
     {{"devices", RL_CMD_DEVICES, NULL, "list OpenCL devices, and which one a run would take", NULL},
      rl_cmd_devices},
 };

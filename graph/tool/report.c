@@ -72,9 +72,7 @@ static void sink(void *ctx, rl_severity severity, rl_where where, const char *te
 
 void rl_reporter_begin(rl_reporter *r, FILE *out, FILE *err)
 {
-    *r = (rl_reporter){
-        .out = out, .err = err, .log = {sink, r}
-    };
+    *r = (rl_reporter){.out = out, .err = err, .log = {sink, r}};
     const char *term = getenv("TERM"), *no_color = getenv("NO_COLOR");
     int fd = fileno(err);
     r->terminal = fd >= 0 && isatty(fd) && term && strcmp(term, "dumb");
