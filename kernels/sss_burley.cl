@@ -8,7 +8,7 @@
 #define TAP_BLOCK 64        /* taps that are turned and rounded at a time */
 #define TURNS     256       /* directions in the table */
 #define NEAR      0.8f      /* lanes share a scale from here to 1 times the farthest */
-#define MIN_WEIGHT 1e-30f
+#define MIN_WEIGHT 1e-12f      /* less in all than a sample 80 d away has: the pixel keeps its own light */
 
 /* Level of detail, by the filter's radius in pixels: from which radius on there is a filter, and the taps of the small
  * and of the large one. passes/sss_burley.c makes the patterns. */
@@ -101,7 +101,7 @@ static inline void sum_taps(const inputs_t *in, const group_t *g, constant float
     floatv w0 = 0.0f, w1 = 0.0f, w2 = 0.0f, c0 = 0.0f, c1 = 0.0f, c2 = 0.0f;
     int at[TAP_BLOCK];
     float r2[TAP_BLOCK], weight[TAP_BLOCK];
-    AREA(floatv here = rl_vload(0, in->area + g->v.at);)
+    AREA(floatv per_own = 1.0f / rl_vload(0, in->area + g->v.at);)
     for (int first = 0; first < n; first += TAP_BLOCK) {
         int last = min(TAP_BLOCK, n - first);
         place_taps(in, g, taps, stride, first, last, at, r2, weight);
@@ -111,7 +111,7 @@ static inline void sum_taps(const inputs_t *in, const group_t *g, constant float
             floatv dz = scatter_keep((rl_vload(0, in->depth + a) - g->z) * g->inv_d, same);
             floatv q = fma(dz, dz, g->scale2 * r2[i]), ir = rsqrt(q), r = q * ir;
             floatv common = scatter_keep(ir * weight[i], same | g->keep);
-            AREA(common *= rl_select(here, rl_vload(0, in->area + a), same);)
+            AREA(common *= rl_select((floatv)1.0f, rl_vload(0, in->area + a) * per_own, same);)
             floatv e0 = weight_exp2(r * g->fall[0]), e1 = weight_exp2(r * g->fall[1]),
                    e2 = weight_exp2(r * g->fall[2]);
             e0 = fma(e0, e0, (floatv)1.0f) * (e0 * common);

@@ -69,7 +69,8 @@ const char *cl_harness_error(const cl_harness *h)
     return h ? h->error : "no OpenCL device";
 }
 
-/* ---- programs ---------------------------------------------------------------------------------------------------- */
+/* ---- programs
+ * ---------------------------------------------------------------------------------------------------- */
 
 static void add_params(rl_str *s, const rl_pass *pass)
 {
@@ -78,8 +79,8 @@ static void add_params(rl_str *s, const rl_pass *pass)
     rl_str_add(s, "typedef struct params_t {\n");
     for (size_t i = 0; i < pass->params.n; i++) {
         const rl_param *row = &pass->params.rows[i];
-        rl_str_printf(s, "    %s %s%s;\n", row->type == RL_F32 || row->type == RL_RGBF ? "float" : "int", row->name,
-                      row->type == RL_RGBF ? "[3]" : "");
+        rl_str_printf(s, "    %s %s%s;\n", row->type == RL_F32 || row->type == RL_RGBF ? "float" : "int",
+                      row->name, row->type == RL_RGBF ? "[3]" : "");
     }
     rl_str_add(s, "} params_t;\n");
 }
@@ -149,11 +150,15 @@ void cl_harness_release(cl_kernel_of_pass **k)
     *k = NULL;
 }
 
-/* ---- running ----------------------------------------------------------------------------------------------------- */
+/* ---- running
+ * ----------------------------------------------------------------------------------------------------- */
 
 frame_t cl_harness_frame(int columns, int rows)
 {
-    frame_t f = {.columns = columns, .rows = rows, .valid = {0, 0, columns, rows}, .stride = columns};
+    frame_t f = {
+        .columns = columns, .rows = rows, .valid = {0, 0, columns, rows},
+                .stride = columns
+    };
     f.plane = columns * rows;
     f.stride4 = columns / 4 + 2 * RL_MARGIN4;
     f.plane4 = 4 * rows * f.stride4;
@@ -189,16 +194,16 @@ bool cl_harness_run(cl_kernel_of_pass *k, const cl_buffer *args, size_t n, const
                                         args[i].data, &code);
             good = check(k->h, code, "clCreateBuffer");
         }
-        good = good &&
-               check(k->h, clSetKernelArg(k->kernel, (cl_uint)i, sizeof buffers[i], &buffers[i]), "clSetKernelArg");
+        good = good && check(k->h, clSetKernelArg(k->kernel, (cl_uint)i, sizeof buffers[i], &buffers[i]),
+                             "clSetKernelArg");
     }
     good = good && launch(k, global, ms);
     for (size_t i = 0; i < n && i < MAX_ARGS; i++) {
         if (!buffers[i])
             continue;
         if (good) { /* a device with memory of its own hands its results back */
-            void *p = clEnqueueMapBuffer(k->h->queue, buffers[i], CL_TRUE, CL_MAP_READ, 0, args[i].bytes, 0, NULL,
-                                         NULL, &code);
+            void *p = clEnqueueMapBuffer(k->h->queue, buffers[i], CL_TRUE, CL_MAP_READ, 0, args[i].bytes, 0,
+                                         NULL, NULL, &code);
             good = check(k->h, code, "clEnqueueMapBuffer");
             if (p)
                 clEnqueueUnmapMemObject(k->h->queue, buffers[i], p, 0, NULL, NULL);

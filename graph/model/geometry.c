@@ -31,7 +31,8 @@ rl_code rl_geometry_make(int x, int y, int width, int height, rl_geometry *out, 
     const long long stride4 = columns / 4 + 2 * RL_MARGIN4;
     const long long plane = stride * rows, plane4 = 16 * (rows / 4) * stride4;
     const long long most = (INT_MAX - 2 * RL_GUARD) / PLANES_AT_LEAST;
-    if (plane > most || plane4 > most || origin_x < INT_MIN || origin_y < INT_MIN)
+    if (plane > most || plane4 > most || origin_x < INT_MIN || origin_y < INT_MIN ||
+        origin_x + columns > INT_MAX || origin_y + rows > INT_MAX)
         return rl_fail(
             err, RL_E_MEMORY, RL_NOWHERE,
             "a data window of %d x %d at (%d, %d) is too large: a plane must have at most %lld pixels", width,

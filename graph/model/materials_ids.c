@@ -40,9 +40,15 @@ static rl_code unknown_name(rl_id_list *list, rl_where where, const char *text, 
     const char **known = rl_arena_array(list->arena, list->n_names, sizeof *known);
     if (!known)
         return rl_fail_memory(err, list->n_names * sizeof *known);
-    for (size_t i = 0; i < list->n_names; i++)
-        known[i] = list->names[i].name;
-    return rl_fail_suggest(err, where, text, name, known, list->n_names);
+    size_t n = 0;
+    for (size_t i = 0; i < list->n_names; i++) { /* several ids may have one name */
+        size_t k = 0;
+        while (k < n && strcmp(known[k], list->names[i].name) != 0)
+            k++;
+        if (k == n)
+            known[n++] = list->names[i].name;
+    }
+    return rl_fail_suggest(err, where, text, name, known, n);
 }
 
 static rl_code read_id(rl_id_list *list, unsigned dense, const rl_value *v, rl_error *err)

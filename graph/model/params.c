@@ -98,11 +98,11 @@ void rl_param_default(const rl_param *row, void *out)
 {
     if (row->type == RL_RGBF) {
         for (size_t i = 0; i < 3; i++)
-            store_float(out, i, row->def[i]);
+            store_float(out, i, row->no_default ? -1 : row->def[i]);
     } else if (row->type == RL_F32) {
-        store_float(out, 0, row->def[0]);
+        store_float(out, 0, row->no_default ? -1 : row->def[0]);
     } else {
-        store_int(out, row->def[0]);
+        store_int(out, row->no_default ? -1 : row->def[0]);
     }
 }
 
@@ -289,7 +289,7 @@ void rl_param_describe(const rl_param *row, rl_str *s)
         if (s->length == words)
             rl_str_add(s, row->type == RL_I32 ? "an integer" : "a number");
     }
-    if (row->optional || row->required) {
+    if (row->no_default || row->required) {
         rl_str_printf(s, "%s%s, %s", unit ? " " : "", unit ? unit : "",
                       row->required ? "required" : "no default");
         return;

@@ -15,7 +15,7 @@ extern "C" {
 rl_code rl_fail_suggest(rl_error *err, rl_where where, const char *text, const char *name,
                         const char *const *known, size_t n);
 
-/* The default of a row, written to out (RL_PARAM_BYTES(row->type) bytes). */
+/* The default of a row, or -1 for .no_default rows, written to out (RL_PARAM_BYTES(row->type) bytes). */
 void rl_param_default(const rl_param *row, void *out);
 
 /* One value: type and range checked in double before narrowing, NaN refused, words known with did-you-mean.
@@ -31,7 +31,7 @@ rl_code rl_params_read(rl_arena *arena, const rl_pass *pass, const char *node, c
 /* A value as YAML text ("auto", "screen", "0.05", "[1, 0, 0]"), appended to s. */
 void rl_param_print(const rl_param *row, const void *value, rl_str *s);
 /* The row's range and default for people: "0 … 1, default 0.05 ratio", "screen|tangent, default screen",
- * "0 … 1 ratio, no default" for .optional rows. */
+ * "0 … 1 ratio, no default" for .no_default rows. */
 void rl_param_describe(const rl_param *row, rl_str *s);
 
 /* A row as a field of an OpenCL struct, "float blend;" or, with the prefix "profile_", "float

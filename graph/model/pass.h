@@ -49,7 +49,7 @@ typedef struct rl_param {
     const char *source;  /* where the idea is from, or NULL */
     bool structural;     /* a #define P_NAME for the program, since the code itself depends on it */
     bool required;       /* profile rows: every profile that a material uses must give it */
-    bool optional;       /* material rows: the default (-1 as a rule) lies outside of the range and says "not given" */
+    bool no_default;     /* rows of the material table with min >= 0: the device sees -1 where it is not given */
 } rl_param;
 
 #define RL_ARRAY_LENGTH(a) (sizeof(a) / sizeof *(a))

@@ -87,6 +87,8 @@ rl_code rl_plan_fits(const rl_plan *plan, const rl_geometry *g, rl_error *err);
 
 /* Bytes of one copy of a buffer, guards included. */
 size_t rl_buffer_bytes(const rl_buffer *buffer, const rl_geometry *g);
+/* How many copies exist at once: a SOURCE or SINK for each frame in flight, both halves of a pair, else 1. */
+size_t rl_buffer_copies(const rl_buffer *buffer, int in_flight);
 /* Bytes of a slot: the largest buffer that lives in it. */
 size_t rl_slot_bytes(const rl_plan *plan, int slot, const rl_geometry *g);
 /* These saturate at SIZE_MAX. Device memory for `in_flight` frames, and what it would be if no buffer shared a slot. */
@@ -95,6 +97,8 @@ size_t rl_plan_bytes_unshared(const rl_plan *plan, const rl_geometry *g, int in_
 
 /* `relit plan` (plan_print.c, plan_dot.c): text for people, graphviz, JSON. g may be NULL: no bytes. */
 struct rl_str; /* graph/base/text.h */
+const char *rl_layout_name(rl_layout layout);           /* "linear", "phase4" */
+const char *rl_buffer_class_name(rl_buffer_class kind); /* "source", "transient", "sink", "history" */
 void rl_plan_print_text(const rl_plan *plan, const rl_geometry *g, int in_flight, struct rl_str *out);
 void rl_plan_print_dot(const rl_plan *plan, const rl_geometry *g, int in_flight, struct rl_str *out);
 rl_code rl_plan_print_json(const rl_plan *plan, const rl_geometry *g, int in_flight, struct rl_str *out, rl_error *err);

@@ -161,8 +161,7 @@ size_t rl_slot_bytes(const rl_plan *plan, int slot_index, const rl_geometry *g)
     return most;
 }
 
-/* Copies of a buffer that exist at once. */
-static size_t copies(const rl_buffer *b, int in_flight)
+size_t rl_buffer_copies(const rl_buffer *b, int in_flight)
 {
     switch (b->kind) {
     case RL_BUFFER_SOURCE:
@@ -181,8 +180,8 @@ size_t rl_plan_bytes(const rl_plan *plan, const rl_geometry *g, int in_flight)
     size_t sum = 0;
     for (size_t i = 0; i < plan->n_buffers; i++)
         if (plan->buffers[i].kind != RL_BUFFER_TRANSIENT)
-            sum = add(sum,
-                      multiply(rl_buffer_bytes(&plan->buffers[i], g), copies(&plan->buffers[i], in_flight)));
+            sum = add(sum, multiply(rl_buffer_bytes(&plan->buffers[i], g),
+                                    rl_buffer_copies(&plan->buffers[i], in_flight)));
     for (size_t i = 0; i < plan->n_slots; i++)
         sum = add(sum, rl_slot_bytes(plan, (int)i, g));
     return sum;
@@ -192,6 +191,7 @@ size_t rl_plan_bytes_unshared(const rl_plan *plan, const rl_geometry *g, int in_
 {
     size_t sum = 0;
     for (size_t i = 0; i < plan->n_buffers; i++)
-        sum = add(sum, multiply(rl_buffer_bytes(&plan->buffers[i], g), copies(&plan->buffers[i], in_flight)));
+        sum = add(sum, multiply(rl_buffer_bytes(&plan->buffers[i], g),
+                                rl_buffer_copies(&plan->buffers[i], in_flight)));
     return sum;
 }

@@ -20,24 +20,14 @@ static bool invert(const double a[12], double out[12])
     return true;
 }
 
-/* World (metres) to view space: right-handed, looks down -z. */
-static void view_matrix(const rl_camera_info *info, double out[12])
-{
-    const double *m = info->world_to_camera;
-    for (int i = 0; i < 12; i++) {
-        double v = i % 4 == 3 ? m[i] * info->unit : m[i];
-        out[i] = i >= 8 && info->forward_z ? -v : v;
-    }
-}
-
 rl_code rl_camera_make(const rl_camera_info *info, camera_t *out, rl_error *err)
 {
-    double view[12], world[12];
+    double world[12];
+    const double *view = info->view;
     memset(out, 0, sizeof *out);
-    for (int i = 0; i < 16; i++)
-        if (!isfinite(info->world_to_camera[i]))
+    for (int i = 0; i < 12; i++)
+        if (!isfinite(view[i]))
             return rl_fail(err, RL_E_DATA, RL_NOWHERE, "the camera's matrix holds a number that is not finite");
-    view_matrix(info, view);
     if (!invert(view, world))
         return rl_fail(err, RL_E_DATA, RL_NOWHERE, "the camera's matrix has no inverse");
     double width = info->fov_x != 0 ? 2 * tan(info->fov_x / 2) : info->screen_width;
@@ -62,19 +52,6 @@ rl_code rl_camera_make(const rl_camera_info *info, camera_t *out, rl_error *err)
     out->jitter[0] = (float)info->jitter[0];
     out->jitter[1] = (float)info->jitter[1];
     return RL_OK;
-}
-
-void rl_camera_rotation(const rl_camera_info *info, float out[9])
-{
-    double world[12];
-    double camera[12]; /* the capture's own camera space: without the flip of view_matrix */
-    for (int i = 0; i < 12; i++)
-        camera[i] = info->world_to_camera[i];
-    if (!invert(camera, world))
-        memset(world, 0, sizeof world);
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++)
-            out[3 * i + j] = (float)world[4 * i + j];
 }
 
 bool rl_camera_jumped(const camera_t *a, const camera_t *b, double reach)

@@ -12,23 +12,17 @@ extern "C" {
 #endif
 
 typedef struct rl_camera_info {
-    double world_to_camera[16]; /* rows listed, column vectors: p_camera = M * p_world; any affine matrix */
-    bool forward_z;             /* the camera looks down +z (left-handed) instead of -z */
-    double unit;                /* metres per unit of the matrix's translation */
-    double fov_x;               /* radians, across the display window; 0: take screen_width */
-    double screen_width;        /* width of the screen window at distance 1 */
-    double screen_center[2];    /* lens shift: the display window's centre in the screen window, x right, y up */
-    double pixel_aspect;        /* width / height of a pixel */
-    double jitter[2];           /* pixels, x right, y down */
-    int display[4];             /* display window: x, y, width, height */
+    double view[12];         /* world (metres) to view space, 3 rows of 4, column vectors; looks down -z */
+    double fov_x;            /* radians, across the display window; 0: take screen_width */
+    double screen_width;     /* width of the screen window at distance 1 */
+    double screen_center[2]; /* lens shift: the display window's centre in the screen window, x right, y up */
+    double pixel_aspect;     /* width / height of a pixel */
+    double jitter[2];        /* pixels, x right, y down */
+    int display[4];          /* display window: x, y, width, height */
 } rl_camera_info;
 
 /* RL_E_DATA when the matrix has no inverse or a number is not finite or out of range (fov in (0, pi)). */
 rl_code rl_camera_make(const rl_camera_info *info, camera_t *out, rl_error *err);
-
-/* The 9 numbers, rows listed, that turn a direction of the capture's own camera space into world space (for normals that
- * are stored in camera space). */
-void rl_camera_rotation(const rl_camera_info *info, float out[9]);
 
 /* True when b is so far from a that reprojection makes no sense: the view direction turned by more than 30 degrees, the
  * camera moved by more than `reach` metres, or the focal length changed by more than a half. */

@@ -7,11 +7,12 @@
 #include "graph/run/color_bake.h"
 #include "graph/run/color_emit.h"
 
-/* ---- names ---------------------------------------------------------------------------------------------------- */
+/* ---- names
+ * ---------------------------------------------------------------------------------------------------- */
 
-/* "<what> 'name'; did you mean …? known: …", with the names of a list. */
-static rl_code unknown(const rl_ocio *ocio, rl_ocio_list list, const char *of, const char *what, const char *name,
-                       rl_where where, rl_error *err)
+/* "… has no <what> 'name'; did you mean …? known: …", with the names of a list. */
+static rl_code unknown(const rl_ocio *ocio, rl_ocio_list list, const char *of, const char *what,
+                       const char *name, rl_where where, rl_error *err)
 {
     rl_arena arena = {0};
     rl_str text = {0};
@@ -19,7 +20,10 @@ static rl_code unknown(const rl_ocio *ocio, rl_ocio_list list, const char *of, c
     rl_code code = rl_ocio_list_names(ocio, list, of, &arena, &names, err);
     if (code != RL_OK)
         goto done;
-    rl_str_printf(&text, "the colour configuration has no %s '%s'", what, name);
+    if (of)
+        rl_str_printf(&text, "display '%s' of the colour configuration has no %s '%s'", of, what, name);
+    else
+        rl_str_printf(&text, "the colour configuration has no %s '%s'", what, name);
     rl_suggest(&text, name, names.names, names.n, "known");
     code = rl_fail(err, RL_E_CONFIG, where, "%s", rl_str_text(&text));
 done:
@@ -39,8 +43,9 @@ rl_code rl_color_working(const rl_ocio *ocio, rl_where where, const char **out, 
     *out = rl_ocio_space(ocio, "scene_linear");
     if (*out)
         return RL_OK;
-    return rl_fail(err, RL_E_CONFIG, where,
-                   "the colour configuration has no role 'scene_linear'; set color.working to a colour space");
+    return rl_fail(
+        err, RL_E_CONFIG, where,
+        "the colour configuration has no role 'scene_linear'; set color.working to a colour space");
 }
 
 /* One name against one list. */
@@ -59,23 +64,20 @@ static rl_code check_name(const rl_ocio *ocio, rl_ocio_list list, const char *of
     return unknown(ocio, list, of, what, name, where, err);
 }
 
-rl_code rl_color_view(const rl_ocio *ocio, const char *display, const char *view, const char *look, rl_where where,
-                      rl_error *err)
+rl_code rl_color_view(const rl_ocio *ocio, const char *display, const char *view, const char *look,
+                      rl_where where, rl_error *err)
 {
-    char what[128] = "view of display";
     rl_code code = check_name(ocio, RL_OCIO_DISPLAYS, NULL, "display", display, where, err);
     if (code != RL_OK)
         return code;
-    strcat(what, " '");
-    strncat(what, display, 64);
-    strcat(what, "'");
-    code = check_name(ocio, RL_OCIO_VIEWS, display, what, view, where, err);
+    code = check_name(ocio, RL_OCIO_VIEWS, display, "view", view, where, err);
     if (code == RL_OK && look)
         code = check_name(ocio, RL_OCIO_LOOKS, NULL, "look", look, where, err);
     return code;
 }
 
-static rl_code check_request(const rl_ocio *ocio, const rl_ocio_request *request, rl_where where, rl_error *err)
+static rl_code check_request(const rl_ocio *ocio, const rl_ocio_request *request, rl_where where,
+                             rl_error *err)
 {
     const char *space;
     rl_code code = rl_color_space(ocio, request->from, where, &space, err);
@@ -89,7 +91,8 @@ static rl_code check_request(const rl_ocio *ocio, const rl_ocio_request *request
     return code;
 }
 
-/* ---- the pass --------------------------------------------------------------------------------------------------- */
+/* ---- the pass
+ * --------------------------------------------------------------------------------------------------- */
 
 static const rl_param params[] = {
     P(rl_color_params, RL_F32, exposure, -64, 64, 0, "stops", "colours are multiplied by 2^exposure first"),
@@ -97,11 +100,13 @@ static const rl_param params[] = {
 RL_PARAMS_MATCH(rl_color_params, 1);
 
 static const rl_port ports[] = {
-    {"in", RL_READ, RL_RGB, "colours in the working space", .layout = RL_LINEAR},
+    {"in",  RL_READ,  RL_RGB, "colours in the working space",                          .layout = RL_LINEAR},
     {"out", RL_WRITE, RL_RGB, "the same in another space, or as a display shows them", .layout = RL_LINEAR},
 };
 
-static const rl_step steps[] = {{"color_apply", RL_EVERY_VECTOR}};
+static const rl_step steps[] = {
+    {"color_apply", RL_EVERY_VECTOR}
+};
 
 static rl_code give_tables(const rl_pass_input *in, rl_arena *arena, rl_tables *out, rl_error *err)
 {
@@ -116,10 +121,11 @@ static void write_program(rl_str *s, const rl_color_text *t)
 {
     for (const char *const *piece = rl_color_prelude; *piece; piece++)
         rl_str_add(s, *piece);
-    rl_str_printf(s,
-                  "\nkernel void color_apply(global const float *in, global float *out, constant params_t *p, "
-                  "constant frame_t *f,\n                        constant material_t *materials%s)\n{\n",
-                  t->table_n ? ", constant float *tables" : "");
+    rl_str_printf(
+        s,
+        "\nkernel void color_apply(global const float *in, global float *out, constant params_t *p, "
+        "constant frame_t *f,\n                        constant material_t *materials%s)\n{\n",
+        t->table_n ? ", constant float *tables" : "");
     rl_str_add(s, "    int i = rl_index(f, RL_W * (int)get_global_id(0), (int)get_global_id(1));\n"
                   "    floatv gain = rl_c_exp2(K(p->exposure));\n"
                   "    floatv r = gain * rl_load(in, i), g = gain * rl_load(in, i + f->plane);\n"
@@ -184,7 +190,8 @@ static rl_code generate(const rl_ocio_transform *transform, const rl_op *ops, si
             return code;
         out->baked = true;
         rl_report(log, RL_WARNING, where,
-                  "the colour operation '%s' has no exact form in relit: a table of 65x65x65 colours stands for the "
+                  "the colour operation '%s' has no exact form in relit: a table of 65x65x65 colours stands "
+                  "for the "
                   "transform, off by up to %.2g of full scale",
                   ops[i].name, out->error);
         return RL_OK;

@@ -17,20 +17,23 @@
 extern "C" {
 #endif
 
-/* ---- names, with errors that help --------------------------------------------------------------------------- */
+/* ---- names, with errors that help
+ * --------------------------------------------------------------------------- */
 
-/* The space that `name` (name, alias or role) stands for; unknown: an error at `where` with the nearest names.
- * *out lives as long as the configuration. Thread-safe. */
-rl_code rl_color_space(const rl_ocio *ocio, const char *name, rl_where where, const char **out, rl_error *err);
+/* The space that `name` (name, alias or role) stands for; unknown: an error at `where` with the nearest
+ * names. *out lives as long as the configuration. Thread-safe. */
+rl_code rl_color_space(const rl_ocio *ocio, const char *name, rl_where where, const char **out,
+                       rl_error *err);
 
 /* Display and view exist, and the look (if any), else an error at `where` that lists what there is. */
-rl_code rl_color_view(const rl_ocio *ocio, const char *display, const char *view, const char *look, rl_where where,
-                      rl_error *err);
+rl_code rl_color_view(const rl_ocio *ocio, const char *display, const char *view, const char *look,
+                      rl_where where, rl_error *err);
 
 /* The working space when the pipeline names none: the role scene_linear. */
 rl_code rl_color_working(const rl_ocio *ocio, rl_where where, const char **out, rl_error *err);
 
-/* ---- a transform as a pass ------------------------------------------------------------------------------------ */
+/* ---- a transform as a pass
+ * ------------------------------------------------------------------------------------ */
 
 /* The parameters of the pass. */
 typedef struct rl_color_params {
@@ -44,24 +47,27 @@ typedef struct rl_color_pass {
     double error;        /* baked: the largest difference that was measured, in output units; else 0 */
 } rl_color_pass;
 
-/* Ports `in` (read, RGB) and `out` (write, RGB), one step over vectors, entry `color_apply`, parameter `exposure`.
- * `exposed`: make a pass even if the transform itself changes nothing, since exposure will not be 0. Names are
- * checked; errors are at `where`. A table that stands for operations is a warning to `log`. Takes about a
- * millisecond, baking a few hundred; thread-safe. */
+/* Ports `in` (read, RGB) and `out` (write, RGB), one step over vectors, entry `color_apply`, parameter
+ * `exposure`. `exposed`: make a pass even if the transform itself changes nothing, since exposure will not be
+ * 0. Names are checked; errors are at `where`. A table that stands for operations is a warning to `log`.
+ * Takes about a millisecond, baking a few hundred; thread-safe. */
 rl_code rl_color_pass_new(const rl_ocio *ocio, const rl_ocio_request *request, bool exposed, rl_where where,
                           rl_arena *arena, const rl_log *log, rl_color_pass *out, rl_error *err);
 
-/* ---- primaries ---------------------------------------------------------------------------------------------------- */
+/* ---- primaries
+ * ---------------------------------------------------------------------------------------------------- */
 
 typedef struct rl_primaries {
-    bool known;   /* the space is linear RGB; xy and name are only set then */
-    double xy[8]; /* CIE 1931 x, y of red, green, blue, white: EXR's `chromaticities` */
+    bool known;       /* the space is linear RGB; xy and name are only set then */
+    double xy[8];     /* CIE 1931 x, y of red, green, blue, white: EXR's `chromaticities` */
     const char *name; /* "Rec.709" and such when it is one of the well known sets, else NULL; static */
 } rl_primaries;
 
-/* Of a colour space, through the role aces_interchange. A space of a well known set that the configuration adapts
- * to the ACES white gets that set's own white and primaries back; another one is described as adapted. */
-rl_code rl_color_primaries(const rl_ocio *ocio, const char *space, rl_where where, rl_primaries *out, rl_error *err);
+/* Of a colour space, through the role aces_interchange. A space of a well known set that the configuration
+ * adapts to the ACES white gets that set's own white and primaries back; another one is described as adapted.
+ */
+rl_code rl_color_primaries(const rl_ocio *ocio, const char *space, rl_where where, rl_primaries *out,
+                           rl_error *err);
 
 #ifdef __cplusplus
 }

@@ -34,7 +34,8 @@ size_t rl_color_table_add(rl_color_text *t, const float *values, size_t n)
     return start;
 }
 
-/* ---- matrix, range ------------------------------------------------------------------------------------------ */
+/* ---- matrix, range
+ * ------------------------------------------------------------------------------------------ */
 
 /* "fma(b, K(…), …)" for one row; a coefficient of 0 costs nothing. */
 static void emit_row(rl_str *s, const double *m, double offset, int row)
@@ -87,9 +88,11 @@ static bool emit_range(rl_color_text *t, const rl_op *op)
     return true;
 }
 
-/* ---- logarithms ------------------------------------------------------------------------------------------------ */
+/* ---- logarithms
+ * ------------------------------------------------------------------------------------------------ */
 
-/* The line below the break, in the log's direction: value = slope·x + offset, and where it ends on both axes. */
+/* The line below the break, in the log's direction: value = slope·x + offset, and where it ends on both axes.
+ */
 typedef struct line {
     double slope, offset, lin_break, log_break;
 } line;
@@ -98,7 +101,8 @@ static line log_line(const rl_op *op, int c)
 {
     double base = log(op->u.log.base), at = op->u.log.lin_break[c];
     double arg = op->u.log.lin_slope[c] * at + op->u.log.lin_offset[c];
-    line l = {.lin_break = at, .log_break = op->u.log.log_slope[c] * log(arg) / base + op->u.log.log_offset[c]};
+    line l = {.lin_break = at,
+              .log_break = op->u.log.log_slope[c] * log(arg) / base + op->u.log.log_offset[c]};
     l.slope = op->u.log.has_line ? op->u.log.line_slope[c]
                                  : op->u.log.log_slope[c] * op->u.log.lin_slope[c] / (arg * base);
     l.offset = l.log_break - l.slope * at;
@@ -145,8 +149,8 @@ static bool emit_log(rl_color_text *t, const rl_op *op)
         }
         line l = log_line(op, i);
         if (op->inverse)
-            rl_str_printf(&t->body, "        %c = select((%c - %s) * %s, n%c, %c > %s);\n", c, c, RL_LIT(l.offset),
-                          RL_LIT(1 / l.slope), c, c, RL_LIT(l.log_break));
+            rl_str_printf(&t->body, "        %c = select((%c - %s) * %s, n%c, %c > %s);\n", c, c,
+                          RL_LIT(l.offset), RL_LIT(1 / l.slope), c, c, RL_LIT(l.log_break));
         else
             rl_str_printf(&t->body, "        %c = select(fma(%c, K(%s), K(%s)), n%c, %c > %s);\n", c, c,
                           RL_LIT(l.slope), RL_LIT(l.offset), c, c, RL_LIT(l.lin_break));
@@ -154,7 +158,8 @@ static bool emit_log(rl_color_text *t, const rl_op *op)
     return true;
 }
 
-/* ---- powers ---------------------------------------------------------------------------------------------------- */
+/* ---- powers
+ * ---------------------------------------------------------------------------------------------------- */
 
 static bool emit_power(rl_color_text *t, const rl_op *op)
 {
@@ -175,13 +180,14 @@ static bool emit_power(rl_color_text *t, const rl_op *op)
         else if (negative == RL_NEGATIVE_MIRROR)
             rl_str_printf(&t->body, "        %c = copysign(rl_c_pow(fabs(%c), K(%s)), %c);\n", c, c, y, c);
         else
-            rl_str_printf(&t->body, "        %c = select(%c, rl_c_pow(%c, K(%s)), %c > 0.0f);\n", c, c, c, y, c);
+            rl_str_printf(&t->body, "        %c = select(%c, rl_c_pow(%c, K(%s)), %c > 0.0f);\n", c, c, c, y,
+                          c);
     }
     return true;
 }
 
-/* A power with a line near 0 ("moncurve"), in one direction: x <= at ? slope·x : power part. The line meets the
- * power with equal value and slope, which fixes where it ends. */
+/* A power with a line near 0 ("moncurve"), in one direction: x <= at ? slope·x : power part. The line meets
+ * the power with equal value and slope, which fixes where it ends. */
 typedef struct moncurve {
     double gamma, offset, scale, at, slope;
 } moncurve;
@@ -192,13 +198,14 @@ typedef struct moncurve {
 static moncurve moncurve_of(double gamma, double offset, bool inverse)
 {
     double g = fmax(gamma, 1 + MONCURVE_LEAST), o = fmax(offset, MONCURVE_LEAST);
-    double at = o / (g - 1);                                 /* on the encoded axis */
-    double linear = pow(o * g / ((g - 1) * (1 + o)), g);      /* on the linear axis */
+    double at = o / (g - 1);                             /* on the encoded axis */
+    double linear = pow(o * g / ((g - 1) * (1 + o)), g); /* on the linear axis */
     moncurve m;
     if (inverse)
         m = (moncurve){.gamma = 1 / g, .offset = o, .scale = 1 + o, .at = linear, .slope = at / linear};
     else
-        m = (moncurve){.gamma = g, .offset = o / (1 + o), .scale = 1 / (1 + o), .at = at, .slope = linear / at};
+        m = (moncurve){
+            .gamma = g, .offset = o / (1 + o), .scale = 1 / (1 + o), .at = at, .slope = linear / at};
     return m;
 }
 
@@ -211,23 +218,24 @@ static bool emit_moncurve(rl_color_text *t, const rl_op *op)
     for (int i = 0; i < 3; i++) {
         char c = channel[i];
         moncurve m = moncurve_of(op->u.moncurve.gamma[i], op->u.moncurve.offset[i], op->inverse);
-        rl_str_printf(&t->body, negative == RL_NEGATIVE_MIRROR ? "        x = fabs(%c);\n" : "        x = %c;\n", c);
+        rl_str_printf(&t->body,
+                      negative == RL_NEGATIVE_MIRROR ? "        x = fabs(%c);\n" : "        x = %c;\n", c);
         if (op->inverse)
             rl_str_printf(&t->body, "        p = fma(rl_c_power(max(x, " TINY "), K(%s)), K(%s), K(%s));\n",
                           RL_LIT(m.gamma), RL_LIT(m.scale), RL_LIT(-m.offset));
         else
-            rl_str_printf(&t->body,
-                          "        p = rl_c_power(max(fma(x, K(%s), K(%s)), " TINY "), K(%s));\n",
+            rl_str_printf(&t->body, "        p = rl_c_power(max(fma(x, K(%s), K(%s)), " TINY "), K(%s));\n",
                           RL_LIT(m.scale), RL_LIT(m.offset), RL_LIT(m.gamma));
         rl_str_printf(&t->body, "        p = select(x * %s, p, x > %s);\n", RL_LIT(m.slope), RL_LIT(m.at));
-        rl_str_printf(&t->body,
-                      negative == RL_NEGATIVE_MIRROR ? "        %c = copysign(p, %c);\n" : "        %c = p;\n", c,
-                      c);
+        rl_str_printf(
+            &t->body,
+            negative == RL_NEGATIVE_MIRROR ? "        %c = copysign(p, %c);\n" : "        %c = p;\n", c, c);
     }
     return true;
 }
 
-/* ---- grading ----------------------------------------------------------------------------------------------------- */
+/* ---- grading
+ * ----------------------------------------------------------------------------------------------------- */
 
 static double reciprocal(double x)
 {
@@ -297,7 +305,8 @@ static bool emit_contrast(rl_color_text *t, const rl_op *op)
         for (int i = 0; i < 3; i++) {
             char c = channel[i];
             if (op->inverse)
-                rl_str_printf(&t->body, "        %c = (%c - %s) * %s;\n", c, c, RL_LIT(offset), RL_LIT(1 / contrast));
+                rl_str_printf(&t->body, "        %c = (%c - %s) * %s;\n", c, c, RL_LIT(offset),
+                              RL_LIT(1 / contrast));
             else
                 rl_str_printf(&t->body, "        %c = fma(%c, K(%s), K(%s));\n", c, c, RL_LIT(contrast),
                               RL_LIT(offset));
@@ -322,17 +331,24 @@ static bool emit_contrast(rl_color_text *t, const rl_op *op)
     return true;
 }
 
-/* ---- all of them --------------------------------------------------------------------------------------------------- */
+/* ---- all of them
+ * --------------------------------------------------------------------------------------------------- */
 
 bool rl_color_emit(rl_color_text *t, const rl_op *op)
 {
     static bool (*const emitters[])(rl_color_text *, const rl_op *) = {
-        [RL_OP_MATRIX] = emit_matrix,        [RL_OP_RANGE] = emit_range,
-        [RL_OP_LOG] = emit_log,              [RL_OP_CURVES] = rl_color_emit_curves,
-        [RL_OP_FIXED] = rl_color_emit_fixed, [RL_OP_POWER] = emit_power,
-        [RL_OP_MONCURVE] = emit_moncurve,    [RL_OP_CDL] = emit_cdl,
-        [RL_OP_CONTRAST] = emit_contrast,    [RL_OP_LUT1D] = rl_color_emit_lut1d,
-        [RL_OP_LUT3D] = rl_color_emit_lut3d, [RL_OP_OTHER] = NULL,
+        [RL_OP_MATRIX] = emit_matrix,
+        [RL_OP_RANGE] = emit_range,
+        [RL_OP_LOG] = emit_log,
+        [RL_OP_CURVES] = rl_color_emit_curves,
+        [RL_OP_FIXED] = rl_color_emit_fixed,
+        [RL_OP_POWER] = emit_power,
+        [RL_OP_MONCURVE] = emit_moncurve,
+        [RL_OP_CDL] = emit_cdl,
+        [RL_OP_CONTRAST] = emit_contrast,
+        [RL_OP_LUT1D] = rl_color_emit_lut1d,
+        [RL_OP_LUT3D] = rl_color_emit_lut3d,
+        [RL_OP_OTHER] = NULL,
     };
     if (!emitters[op->kind])
         return false;

@@ -6,17 +6,18 @@
 static const char channel[3] = {'r', 'g', 'b'};
 
 /* "Grading log": stops from 18 % grey, a line below xbrk (OpenColorIO's GradingRGBCurve, style lin). */
-static const double lin_break = 0.0041318374739483946, lin_shift = -0.000157849851665374, lin_gain = 363.034608563,
-                    lin_offset = -7, log_break = -5.5;
+static const double lin_break = 0.0041318374739483946, lin_shift = -0.000157849851665374,
+                    lin_gain = 363.034608563, lin_offset = -7, log_break = -5.5;
 
 static void emit_lin_to_log(rl_color_text *t)
 {
     for (int i = 0; i < 3; i++) {
         char c = channel[i];
-        rl_str_printf(&t->body,
-                      "        %c = select(fma(%c, K(%s), K(%s)), rl_c_log2(max((%c + %s) * %s, TINY)), %c >= %s);\n", c,
-                      c, RL_LIT(lin_gain), RL_LIT(lin_offset), c, RL_LIT(lin_shift), RL_LIT(1 / (0.18 + lin_shift)), c,
-                      RL_LIT(lin_break));
+        rl_str_printf(
+            &t->body,
+            "        %c = select(fma(%c, K(%s), K(%s)), rl_c_log2(max((%c + %s) * %s, TINY)), %c >= %s);\n",
+            c, c, RL_LIT(lin_gain), RL_LIT(lin_offset), c, RL_LIT(lin_shift), RL_LIT(1 / (0.18 + lin_shift)),
+            c, RL_LIT(lin_break));
     }
 }
 
@@ -25,9 +26,9 @@ static void emit_log_to_lin(rl_color_text *t)
     for (int i = 0; i < 3; i++) {
         char c = channel[i];
         rl_str_printf(&t->body,
-                      "        %c = select((%c - %s) * %s, fma(rl_c_exp2(%c), K(%s), K(%s)), %c >= %s);\n", c, c,
-                      RL_LIT(lin_offset), RL_LIT(1 / lin_gain), c, RL_LIT(0.18 + lin_shift), RL_LIT(-lin_shift), c,
-                      RL_LIT(log_break));
+                      "        %c = select((%c - %s) * %s, fma(rl_c_exp2(%c), K(%s), K(%s)), %c >= %s);\n", c,
+                      c, RL_LIT(lin_offset), RL_LIT(1 / lin_gain), c, RL_LIT(0.18 + lin_shift),
+                      RL_LIT(-lin_shift), c, RL_LIT(log_break));
     }
 }
 
@@ -50,9 +51,10 @@ static double end_slope(const rl_op_spline *s)
     return 2 * s->a[last] * ((double)s->knots[s->n - 1] - s->knots[last]) + s->b[last];
 }
 
-/* A smooth quadratic spline is one parabola plus a multiple d of max(x - knot, 0)² for every knot to its right and of
- * min(x - knot, 0)² for every knot to its left. With √|d| inside of the square that is three operations a knot, no
- * comparison and no table. The parabola is the middle piece's: the sums then cancel least. */
+/* A smooth quadratic spline is one parabola plus a multiple d of max(x - knot, 0)² for every knot to its
+ * right and of min(x - knot, 0)² for every knot to its left. With √|d| inside of the square that is three
+ * operations a knot, no comparison and no table. The parabola is the middle piece's: the sums then cancel
+ * least. */
 static void emit_smooth(rl_color_text *t, const rl_op_spline *s, char c)
 {
     size_t mid = (s->n - 2) / 2;
@@ -65,18 +67,20 @@ static void emit_smooth(rl_color_text *t, const rl_op_spline *s, char c)
         double root = sqrt(fabs(change));
         if (change != 0)
             rl_str_printf(&t->body, "        u = %s(fma(x, K(%s), K(%s)), 0.0f), y = fma(%su, u, y);\n",
-                          i > mid ? "max" : "min", RL_LIT(root), RL_LIT(-root * s->knots[i]), change < 0 ? "-" : "");
+                          i > mid ? "max" : "min", RL_LIT(root), RL_LIT(-root * s->knots[i]),
+                          change < 0 ? "-" : "");
     }
     if (s->b[0] != 0)
-        rl_str_printf(&t->body, "        y = fma(min(%c - %s, 0.0f), K(%s), y);\n", c, RL_LIT(first), RL_LIT(s->b[0]));
+        rl_str_printf(&t->body, "        y = fma(min(%c - %s, 0.0f), K(%s), y);\n", c, RL_LIT(first),
+                      RL_LIT(s->b[0]));
     if (fabs(end_slope(s)) > 1e-7)
         rl_str_printf(&t->body, "        y = fma(max(%c - %s, 0.0f), K(%s), y);\n", c, RL_LIT(last),
                       RL_LIT(end_slope(s)));
     rl_str_printf(&t->body, "        %c = y;\n", c);
 }
 
-/* For pieces that do not meet smoothly, and for the inverse: a chain of selections finds the piece. `at` are the
- * thresholds: knots, or the values at the knots. */
+/* For pieces that do not meet smoothly, and for the inverse: a chain of selections finds the piece. `at` are
+ * the thresholds: knots, or the values at the knots. */
 static void emit_piece(rl_color_text *t, const rl_op_spline *s, const float *at, char c)
 {
     rl_str_printf(&t->body, "        ka = K(%s), kb = K(%s), kc = K(%s), k = K(%s);\n", RL_LIT(s->a[0]),
@@ -85,7 +89,8 @@ static void emit_piece(rl_color_text *t, const rl_op_spline *s, const float *at,
         rl_str_printf(&t->body,
                       "        m = %c >= %s, ka = select(ka, K(%s), m), kb = select(kb, K(%s), m), "
                       "kc = select(kc, K(%s), m), k = select(k, K(%s), m);\n",
-                      c, RL_LIT(at[i]), RL_LIT(s->a[i]), RL_LIT(s->b[i]), RL_LIT(s->c[i]), RL_LIT(s->knots[i]));
+                      c, RL_LIT(at[i]), RL_LIT(s->a[i]), RL_LIT(s->b[i]), RL_LIT(s->c[i]),
+                      RL_LIT(s->knots[i]));
 }
 
 static void emit_pieces(rl_color_text *t, const rl_op_spline *s, char c)
@@ -110,8 +115,8 @@ static void emit_inverse(rl_color_text *t, const rl_op_spline *s, char c)
     rl_str_printf(&t->body, "        u = kc - min(max(%c, %s), %s);\n", c, RL_LIT(low), RL_LIT(high));
     rl_str_add(&t->body, "        v = sqrt(max(kb * kb - 4.0f * ka * u, 0.0f)) + kb;\n"
                          "        y = k - 2.0f * u / max(v, 1e-30f);\n");
-    rl_str_printf(&t->body, "        y = select(y, (%c - %s) * %s + %s, %c <= %s);\n", c, RL_LIT(low), RL_LIT(below),
-                  RL_LIT(s->knots[0]), c, RL_LIT(low));
+    rl_str_printf(&t->body, "        y = select(y, (%c - %s) * %s + %s, %c <= %s);\n", c, RL_LIT(low),
+                  RL_LIT(below), RL_LIT(s->knots[0]), c, RL_LIT(low));
     rl_str_printf(&t->body, "        %c = select(y, (%c - %s) * %s + %s, %c >= %s);\n", c, c, RL_LIT(high),
                   RL_LIT(above), RL_LIT(s->knots[s->n - 1]), c, RL_LIT(high));
 }

@@ -21,8 +21,8 @@ static bool emit_glow(rl_color_text *t, const char *gain, const char *mid, bool 
 
 static bool emit_red_10(rl_color_text *t, const char *scale, const char *strength, bool inverse)
 {
-    rl_str_printf(&t->body, "        r = rl_c_red_mod%s(r, g, b, %s, %s);\n", inverse ? "_inverse" : "", scale,
-                  strength);
+    rl_str_printf(&t->body, "        r = rl_c_red_mod%s(r, g, b, %s, %s);\n", inverse ? "_inverse" : "",
+                  scale, strength);
     return true;
 }
 
@@ -38,8 +38,8 @@ static bool emit_red_03(rl_color_text *t, const char *scale, const char *strengt
     return true;
 }
 
-static bool emit_surround(rl_color_text *t, const char *red, const char *green, const char *blue, double least,
-                          double gamma)
+static bool emit_surround(rl_color_text *t, const char *red, const char *green, const char *blue,
+                          double least, double gamma)
 {
     rl_str_printf(&t->body,
                   "        floatv s = rl_c_surround(fma(r, K(%s), fma(g, K(%s), b * %s)), %s, %s);\n"
@@ -58,7 +58,7 @@ static bool emit_gamut(rl_color_text *t, const rl_op *op)
         double span = limit[i] - threshold[i];
         double scale = span / pow(pow((1 - threshold[i]) / span, -power) - 1, 1 / power);
         rl_str_printf(&t->body, "        %c = rl_c_gamut(%c, ach, %s, %s, %s, %d);\n", "rgb"[i], "rgb"[i],
-                      RL_LIT(threshold[i]), RL_LIT(scale), RL_LIT(power), op->inverse);
+                      RL_LIT(threshold[i]), RL_LIT(scale), RL_LIT(power), op -> inverse);
     }
     return true;
 }
@@ -91,7 +91,8 @@ bool rl_color_emit_fixed(rl_color_text *t, const rl_op *op)
     return false;
 }
 
-/* ---- tables -------------------------------------------------------------------------------------------------------- */
+/* ---- tables
+ * -------------------------------------------------------------------------------------------------------- */
 
 bool rl_color_emit_lut1d(rl_color_text *t, const rl_op *op)
 {
@@ -104,7 +105,8 @@ bool rl_color_emit_lut1d(rl_color_text *t, const rl_op *op)
         if (op->u.lut1d.half_domain)
             rl_str_printf(&t->body, "        %c = rl_c_lut_half(tables + %zu, %d, %c);\n", c, start, i, c);
         else
-            rl_str_printf(&t->body, "        %c = rl_c_lut1d(tables + %zu, %zu, %d, %c);\n", c, start, n, i, c);
+            rl_str_printf(&t->body, "        %c = rl_c_lut1d(tables + %zu, %zu, %d, %c);\n", c, start, n, i,
+                          c);
     }
     return true;
 }

@@ -1,8 +1,8 @@
 #include "graph/run/color_emit.h"
 
 /* Approximations, with their largest errors over the stated domains (tests/test_color.c measures them):
- * rl_c_log2: 3e-7 absolute in [-1, 1], else 2e-7 relative; rl_c_exp2: 3e-7 relative; rl_c_atan: 5e-6 absolute.
- * Polynomials are minimax, found with Remez' algorithm. */
+ * rl_c_log2: 3e-7 absolute in [-1, 1], else 2e-7 relative; rl_c_exp2: 3e-7 relative; rl_c_atan: 5e-6
+ * absolute. Polynomials are minimax, found with Remez' algorithm. */
 const char *const rl_color_prelude[] = {
     "/* ---- logarithm, power ---- */\n"
     "#define K(x) ((floatv)(x))\n"
@@ -47,8 +47,7 @@ const char *const rl_color_prelude[] = {
     "{\n"
     "    return select(K(0.0f), rl_c_power(max(x, TINY), y), x > 0.0f);\n"
     "}\n"
-    "\n"
-    ,
+    "\n",
     "/* ---- ACES 1 ---- */\n"
     "static inline floatv rl_c_saturation(floatv r, floatv g, floatv b)\n"
     "{\n"
@@ -89,8 +88,7 @@ const char *const rl_color_prelude[] = {
     "{\n"
     "    return (middle - low) / max(r - low, 1e-10f) * (to - low) + low;\n"
     "}\n"
-    "\n"
-    ,
+    "\n",
     "/* What the glow multiplies colours by, minus 1. */\n"
     "static inline floatv rl_c_glow(floatv r, floatv g, floatv b, float gain, float mid, int inverse)\n"
     "{\n"
@@ -112,10 +110,10 @@ const char *const rl_color_prelude[] = {
     "{\n"
     "    return rl_c_power(max(y, least), K(exponent));\n"
     "}\n"
-    "\n"
-    ,
+    "\n",
     "/* One channel of the ACES 1.3 gamut compression, and back. */\n"
-    "static inline floatv rl_c_gamut(floatv v, floatv ach, float threshold, float scale, float power, int inverse)\n"
+    "static inline floatv rl_c_gamut(floatv v, floatv ach, float threshold, float scale, float power, int "
+    "inverse)\n"
     "{\n"
     "    floatv size = fabs(ach), dist = (ach - v) / max(size, 1e-30f);\n"
     "    floatv nd = max(dist - threshold, 0.0f) / scale, p = rl_c_pow(nd, K(power)), to;\n"
@@ -128,17 +126,21 @@ const char *const rl_color_prelude[] = {
     "    floatv out = select(ach - to * size, v, dist < threshold);\n"
     "    return select(out, K(0.0f), ach == 0.0f);\n"
     "}\n"
-    "\n"
-    ,
+    "\n",
     "/* ---- tables ---- */\n"
     "#if RL_W == 16\n"
-    "#define GATHER(t, i)                                                                                   \\\n"
-    "    ((floatv)((t)[(i).s0], (t)[(i).s1], (t)[(i).s2], (t)[(i).s3], (t)[(i).s4], (t)[(i).s5], (t)[(i).s6],  \\\n"
-    "              (t)[(i).s7], (t)[(i).s8], (t)[(i).s9], (t)[(i).sa], (t)[(i).sb], (t)[(i).sc], (t)[(i).sd],  \\\n"
+    "#define GATHER(t, i)                                                                                   "
+    "\\\n"
+    "    ((floatv)((t)[(i).s0], (t)[(i).s1], (t)[(i).s2], (t)[(i).s3], (t)[(i).s4], (t)[(i).s5], "
+    "(t)[(i).s6],  \\\n"
+    "              (t)[(i).s7], (t)[(i).s8], (t)[(i).s9], (t)[(i).sa], (t)[(i).sb], (t)[(i).sc], "
+    "(t)[(i).sd],  \\\n"
     "              (t)[(i).se], (t)[(i).sf]))\n"
     "#elif RL_W == 8\n"
-    "#define GATHER(t, i)                                                                                   \\\n"
-    "    ((floatv)((t)[(i).s0], (t)[(i).s1], (t)[(i).s2], (t)[(i).s3], (t)[(i).s4], (t)[(i).s5], (t)[(i).s6],  \\\n"
+    "#define GATHER(t, i)                                                                                   "
+    "\\\n"
+    "    ((floatv)((t)[(i).s0], (t)[(i).s1], (t)[(i).s2], (t)[(i).s3], (t)[(i).s4], (t)[(i).s5], "
+    "(t)[(i).s6],  \\\n"
     "              (t)[(i).s7]))\n"
     "#else\n"
     "#define GATHER(t, i) ((floatv)((t)[(i).s0], (t)[(i).s1], (t)[(i).s2], (t)[(i).s3]))\n"
@@ -155,7 +157,8 @@ const char *const rl_color_prelude[] = {
     "    return fma(w, b - a, a);\n"
     "}\n"
     "\n"
-    "/* 65536 entries of RGB, one for each half float: the bits of a float beyond a half's are the weight. */\n"
+    "/* 65536 entries of RGB, one for each half float: the bits of a float beyond a half's are the weight. "
+    "*/\n"
     "static inline floatv rl_c_lut_half(constant float *t, int c, floatv x)\n"
     "{\n"
     "    floatv m = min(fabs(x), 65504.0f);\n"
@@ -178,7 +181,8 @@ const char *const rl_color_prelude[] = {
     "    return i;\n"
     "}\n"
     "\n"
-    "/* Tetrahedral: from the near corner along the axis that is farthest, then the next, to the far corner. */\n"
+    "/* Tetrahedral: from the near corner along the axis that is farthest, then the next, to the far corner. "
+    "*/\n"
     "static inline void rl_c_lut3d(constant float *t, int n, floatv *r, floatv *g, floatv *b)\n"
     "{\n"
     "    floatv x, y, z;\n"
@@ -191,10 +195,12 @@ const char *const rl_color_prelude[] = {
     "    intv i1 = i + first, i2 = i + (dx + dy + dz) - last, i3 = i + (dx + dy + dz);\n"
     "    floatv w0 = 1.0f - most, w1 = most - mid, w2 = mid - least;\n"
     "    *r = w0 * GATHER(t, i) + w1 * GATHER(t, i1) + w2 * GATHER(t, i2) + least * GATHER(t, i3);\n"
-    "    *g = w0 * GATHER(t + 1, i) + w1 * GATHER(t + 1, i1) + w2 * GATHER(t + 1, i2) + least * GATHER(t + 1, i3);\n"
-    "    *b = w0 * GATHER(t + 2, i) + w1 * GATHER(t + 2, i1) + w2 * GATHER(t + 2, i2) + least * GATHER(t + 2, i3);\n"
+    "    *g = w0 * GATHER(t + 1, i) + w1 * GATHER(t + 1, i1) + w2 * GATHER(t + 1, i2) + least * GATHER(t + "
+    "1, i3);\n"
+    "    *b = w0 * GATHER(t + 2, i) + w1 * GATHER(t + 2, i1) + w2 * GATHER(t + 2, i2) + least * GATHER(t + "
+    "2, i3);\n"
     "}\n"
-    "\n"
+    "\n",
     "static inline floatv rl_c_corners(constant float *t, int n, intv i, floatv x, floatv y, floatv z)\n"
     "{\n"
     "    int dx = 3 * n * n, dy = 3 * n;\n"

@@ -130,18 +130,37 @@ void rl_exr_attr_at(const rl_exr *file, int part, size_t i, const char **name, c
 
 /* ---- printing ---- */
 
-static void print_numbers(const rl_exr_value *v, bool narrow, rl_str *out)
+static void print_number(rl_exr_type type, double v, rl_str *out)
 {
     char text[32];
+    switch (type) {
+    case RL_EXR_T_INT:
+    case RL_EXR_T_V2I:
+    case RL_EXR_T_V3I:
+    case RL_EXR_T_BOX2I:
+        rl_str_printf(out, "%.0f", v);
+        break;
+    case RL_EXR_T_DOUBLE:
+    case RL_EXR_T_V2D:
+    case RL_EXR_T_V3D:
+    case RL_EXR_T_M33D:
+    case RL_EXR_T_M44D:
+        rl_str_add(out, rl_format_double(v, text));
+        break;
+    default:
+        rl_str_add(out, rl_format_float((float)v, text));
+    }
+}
+
+static void print_numbers(const rl_exr_value *v, rl_str *out)
+{
     int n = rl_exr_type_numbers(v->type);
-    if (n > 1)
-        rl_str_add(out, "[");
+    rl_str_add(out, n > 1 ? "[" : "");
     for (int i = 0; i < n; i++) {
         rl_str_add(out, i ? " " : "");
-        rl_str_add(out, narrow ? rl_format_float((float)v->v[i], text) : rl_format_double(v->v[i], text));
+        print_number(v->type, v->v[i], out);
     }
-    if (n > 1)
-        rl_str_add(out, "]");
+    rl_str_add(out, n > 1 ? "]" : "");
 }
 
 /* SMPTE 12M: binary-coded decimal digits between flags. */
@@ -228,11 +247,7 @@ void rl_exr_attr_print(const rl_exr *file, int part, size_t i, rl_str *out)
     else if (v.type == RL_EXR_T_OTHER)
         print_other(a, out);
     else
-        print_numbers(&v,
-                      v.type != RL_EXR_T_DOUBLE && v.type != RL_EXR_T_INT && v.type != RL_EXR_T_M44D &&
-                          v.type != RL_EXR_T_M33D && v.type != RL_EXR_T_V2D && v.type != RL_EXR_T_V3D &&
-                          v.type != RL_EXR_T_V2I && v.type != RL_EXR_T_V3I && v.type != RL_EXR_T_BOX2I,
-                      out);
+        print_numbers(&v, out);
 }
 
 /* ---- writing ---- */

@@ -23,53 +23,62 @@ uint64_t rl_ingest_scalar(float *plane, rl_rows rows, float scale, float offset,
 /* ---- depth -----------------------------------------------------------------------------------------------
  */
 
-static void planar_row(float *row, int width, const rl_ingest_depth *how)
+static void planar_row(float *row, int width, const rl_layer *layer)
 {
-    double top = how->empty < (double)INFINITY ? how->empty : 3.4e38;
-    float unit = (float)how->unit, empty = (float)top;
+    float scale = (float)layer->scale;
+    float empty = layer->empty < 3.4e38 ? (float)layer->empty : 3.4e38f;
     for (int x = 0; x < width; x++) {
         float v = row[x];
-        row[x] = v > 0 && v < empty ? v * unit : 0.0f;
+        row[x] = v > 0 && v < empty ? v * scale : 0.0f;
     }
 }
 
-/* distance -> depth: a point at distance d along the ray (rx, ry, -1) has depth d / |ray|. */
-static void radial_row(float *row, int width, int y, const rl_ingest_depth *how)
+/* The length of the view ray of a pixel per unit of planar depth. */
+static double ray_slope(const rl_ingest_depth *how, int x, int y)
 {
     const camera_t *c = how->camera;
-    double py = (double)how->y + y + 0.5 + (double)c->jitter[1];
+    double px = (double)how->x + x + 0.5 + (double)c->jitter[0], py = (double)how->y + y + 0.5 + (double)c->jitter[1];
+    double rx = (px - (double)c->centre[0]) / (double)c->focal[0];
     double ry = (py - (double)c->centre[1]) / (double)c->focal[1];
-    for (int x = 0; x < width; x++) {
-        double px = (double)how->x + x + 0.5 + (double)c->jitter[0];
-        double rx = (px - (double)c->centre[0]) / (double)c->focal[0];
-        double v = (double)row[x];
-        bool solid = v > 0 && v < how->empty && isfinite(v);
-        row[x] = solid ? (float)(v * how->unit / sqrt(1.0 + rx * rx + ry * ry)) : 0.0f;
-    }
-}
-
-/* z = 1 at the far plane, 0 at the near one (reversed: the other way round), hyperbolic in between:
- * depth = near·far / (far - z·(far - near)), for far = infinity near / (1 - z). */
-static void device_row(float *row, int width, const rl_ingest_depth *how)
-{
-    double n = how->near_, f = how->far_;
-    for (int x = 0; x < width; x++) {
-        double z = how->reversed ? 1.0 - (double)row[x] : (double)row[x];
-        double d = isinf(f) ? n / (1.0 - z) : n * f / (f - z * (f - n));
-        row[x] = z >= 0 && z < 1 && d < how->empty && isfinite(d) ? (float)(d * how->unit) : 0.0f;
-    }
+    return sqrt(1 + rx * rx + ry * ry);
 }
 
 void rl_ingest_depth_rows(float *plane, rl_rows rows, const rl_ingest_depth *how)
 {
+    const rl_layer *layer = how->layer;
     for (int y = rows.y0; y < rows.y1; y++) {
         float *row = plane + (size_t)y * rows.stride;
-        if (how->kind == RL_DEPTH_PLANAR)
-            planar_row(row, rows.width, how);
-        else if (how->kind == RL_DEPTH_RADIAL)
-            radial_row(row, rows.width, y, how);
-        else
-            device_row(row, rows.width, how);
+        if (layer->kind == RL_DEPTH_PLANAR) {
+            planar_row(row, rows.width, layer);
+            continue;
+        }
+        for (int x = 0; x < rows.width; x++) {
+            double slope = layer->kind == RL_DEPTH_RADIAL ? ray_slope(how, x, y) : 1;
+            double v = (double)row[x];
+            double d = rl_layer_is_empty(layer, v) ? 0 : rl_layer_depth(layer, v, slope);
+            row[x] = d > 0 && isfinite(d) ? (float)d : 0.0f;
+        }
+    }
+}
+
+/* ---- motion ---------------------------------------------------------------------------------------------- */
+
+void rl_ingest_motion_rows(float *const planes[2], rl_rows rows, const rl_layer *layer, int width, int height)
+{
+    float unit = layer->motion_unit == RL_MOTION_PIXELS ? 0.0f : layer->motion_unit == RL_MOTION_UV ? 1.0f : 0.5f;
+    float sx = unit > 0 ? unit * (float)width : 1.0f, sy = unit > 0 ? unit * (float)height : 1.0f;
+    if (layer->points_next) {
+        sx = -sx;
+        sy = -sy;
+    }
+    if (layer->y_up)
+        sy = -sy;
+    for (int y = rows.y0; y < rows.y1; y++) {
+        size_t at = (size_t)y * rows.stride;
+        for (int x = 0; x < rows.width; x++) {
+            planes[0][at + (size_t)x] *= sx;
+            planes[1][at + (size_t)x] *= sy;
+        }
     }
 }
 
@@ -77,10 +86,10 @@ void rl_ingest_depth_rows(float *plane, rl_rows rows, const rl_ingest_depth *how
  */
 
 /* Cigolle et al. 2014, "A Survey of Efficient Representations for Independent Unit Vectors". */
-static void octahedral_row(float *x, float *y, float *z, int width, bool zero_to_one)
+static void octahedral_row(float *x, float *y, float *z, int width)
 {
     for (int i = 0; i < width; i++) {
-        float u = zero_to_one ? x[i] * 2 - 1 : x[i], v = zero_to_one ? y[i] * 2 - 1 : y[i];
+        float u = x[i], v = y[i];
         float w = 1 - fabsf(u) - fabsf(v);
         if (w < 0) {
             float t = u;
@@ -119,9 +128,9 @@ void rl_ingest_normal_rows(float *const planes[3], rl_rows rows, const rl_ingest
     for (int row = rows.y0; row < rows.y1; row++) {
         size_t at = (size_t)row * rows.stride;
         float *x = planes[0] + at, *y = planes[1] + at, *z = planes[2] + at;
-        if (how->encoding == RL_NORMAL_OCTAHEDRAL)
-            octahedral_row(x, y, z, rows.width, how->unsigned_octahedral);
-        for (int i = 0; how->encoding == RL_NORMAL_UNSIGNED && i < rows.width; i++) {
+        if (how->encoding == RL_ENCODING_OCTAHEDRAL)
+            octahedral_row(x, y, z, rows.width);
+        for (int i = 0; how->encoding == RL_ENCODING_UNSIGNED && i < rows.width; i++) {
             x[i] = x[i] * 2 - 1;
             y[i] = y[i] * 2 - 1;
             z[i] = z[i] * 2 - 1;

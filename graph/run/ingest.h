@@ -12,6 +12,7 @@
 #include <stdint.h>
 
 #include "graph/base/error.h"
+#include "graph/model/manifest.h"
 #include "graph/model/materials.h"
 #include "kernels/shared.h"
 
@@ -27,38 +28,28 @@ typedef struct rl_rows {
 /* x·scale + offset, then clamped to low…high. Returns how many were clamped. */
 uint64_t rl_ingest_scalar(float *plane, rl_rows rows, float scale, float offset, float low, float high);
 
-typedef enum rl_depth_kind { RL_DEPTH_PLANAR, RL_DEPTH_RADIAL, RL_DEPTH_DEVICE } rl_depth_kind;
-
 typedef struct rl_ingest_depth {
-    rl_depth_kind kind;
-    double unit;            /* metres per unit of the file (planar, radial, near, far) */
-    double empty;           /* in the file's units: values from here on are empty */
-    double near_, far_;     /* DEVICE, in the file's units; far_ may be infinite */
-    bool reversed;          /* DEVICE: 1 at the near plane */
-    const camera_t *camera; /* RADIAL: focal, centre, jitter */
-    int x, y;               /* RADIAL: display-window pixel of the data window's first */
+    const rl_layer *layer;
+    const camera_t *camera; /* RL_DEPTH_RADIAL: focal, centre, jitter */
+    int x, y;               /* RL_DEPTH_RADIAL: display-window pixel of the data window's first */
 } rl_ingest_depth;
 
 /* Planar metres; 0 where the pixel is empty (>= empty, infinite, <= 0; DEVICE: at or behind the far plane).
  */
 void rl_ingest_depth_rows(float *plane, rl_rows rows, const rl_ingest_depth *how);
 
-typedef enum rl_normal_encoding {
-    RL_NORMAL_SIGNED,
-    RL_NORMAL_UNSIGNED,
-    RL_NORMAL_OCTAHEDRAL
-} rl_normal_encoding;
-
 /* World space, unit length; a normal of length 0 stays 0. `rotate`: 9 numbers, rows listed, applied to the
  * decoded vector, or NULL. OCTAHEDRAL reads planes 0 and 1 (0…1 when `unsigned_octahedral`, else -1…1) and
  * writes all three. */
 typedef struct rl_ingest_normal {
-    rl_normal_encoding encoding;
-    bool unsigned_octahedral;
+    rl_encoding encoding;
     const float *rotate;
 } rl_ingest_normal;
 
 void rl_ingest_normal_rows(float *const planes[3], rl_rows rows, const rl_ingest_normal *how);
+
+/* Vectors to the frame before, in pixels, x right, y down. `width` and `height`: of the display window. */
+void rl_ingest_motion_rows(float *const planes[2], rl_rows rows, const rl_layer *layer, int width, int height);
 
 /* Ids that no material covers: up to 8 of them, the smallest, with their pixel counts. Zeroed by the caller.
  */

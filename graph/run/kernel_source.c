@@ -92,6 +92,10 @@ rl_code rl_kernel_text(rl_arena *arena, const rl_plan *plan, const rl_plan_node 
     rl_code code = add_shared(arena, out, err);
     if (code)
         return code;
+    if (pass->kernel_prelude)
+        code = add_file(arena, pass->kernel_prelude, out, err);
+    if (code)
+        return code;
     if (pass->kernel_text)
         rl_str_printf(out, "#line 1 \"%s\"\n%s\n", pass->kernel_file ? pass->kernel_file : n->name,
                       pass->kernel_text);

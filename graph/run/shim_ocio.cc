@@ -79,7 +79,8 @@ extern "C" void rl_ocio_free(rl_ocio **ocio)
     destroy(ocio);
 }
 
-/* ---- names -------------------------------------------------------------------------------------------------- */
+/* ---- names
+ * -------------------------------------------------------------------------------------------------- */
 
 static int count_names(const OCIO::Config &config, rl_ocio_list what, const char *of)
 {
@@ -157,7 +158,8 @@ extern "C" bool rl_ocio_is_data(const rl_ocio *ocio, const char *name)
     }
 }
 
-/* ---- transforms --------------------------------------------------------------------------------------------- */
+/* ---- transforms
+ * --------------------------------------------------------------------------------------------- */
 
 static OCIO::ConstProcessorRcPtr make_processor(const OCIO::Config &config, const rl_ocio_request *request)
 {
@@ -227,7 +229,8 @@ extern "C" rl_code rl_ocio_apply(const rl_ocio_transform *transform, float *r, f
     }
 }
 
-extern "C" rl_code rl_ocio_shader(const rl_ocio_transform *transform, rl_arena *arena, char **out, rl_error *err)
+extern "C" rl_code rl_ocio_shader(const rl_ocio_transform *transform, rl_arena *arena, char **out,
+                                  rl_error *err)
 {
     *out = nullptr;
     try {
@@ -253,7 +256,8 @@ extern "C" rl_code rl_ocio_ops(const rl_ocio_transform *transform, rl_arena *are
     }
 }
 
-/* ---- primaries ------------------------------------------------------------------------------------------------ */
+/* ---- primaries
+ * ------------------------------------------------------------------------------------------------ */
 
 static bool linear_matrix(const rl_op *ops, size_t n, double m[9])
 {

@@ -1,8 +1,8 @@
 /* OpenColorIO behind a C interface: open a configuration, look at its names, make a transform, list what the
  * transform consists of, apply it on the CPU. The only place (with shim_ocio.cc) that sees OpenColorIO.
  *
- * Threads: a configuration and a transform are constant once made; every function but _free may be called from
- * several threads at a time. Errors from OpenColorIO are RL_E_COLOR with its own words. */
+ * Threads: a configuration and a transform are constant once made; every function but _free may be called
+ * from several threads at a time. Errors from OpenColorIO are RL_E_COLOR with its own words. */
 #ifndef RL_RUN_SHIM_OCIO_H
 #define RL_RUN_SHIM_OCIO_H
 
@@ -23,7 +23,8 @@ typedef struct rl_ocio_transform rl_ocio_transform; /* a processor made from one
 rl_code rl_ocio_open(const char *path, rl_ocio **out, rl_error *err);
 void rl_ocio_free(rl_ocio **ocio);
 
-/* ---- names -------------------------------------------------------------------------------------------------- */
+/* ---- names
+ * -------------------------------------------------------------------------------------------------- */
 
 typedef enum rl_ocio_list {
     RL_OCIO_SPACES, /* colour spaces, of scene and display, inactive ones included */
@@ -48,10 +49,12 @@ const char *rl_ocio_space(const rl_ocio *ocio, const char *name);
 /* The colour space holds numbers that are not colours (`isdata`). */
 bool rl_ocio_is_data(const rl_ocio *ocio, const char *space);
 
-/* ---- transforms --------------------------------------------------------------------------------------------- */
+/* ---- transforms
+ * --------------------------------------------------------------------------------------------- */
 
-/* From `from` to the colour space `to`, or to `display` and `view` (then `to` is NULL). `look` may be NULL; it is
- * applied to the source, in front of the view. Names as OpenColorIO takes them: aliases and roles included. */
+/* From `from` to the colour space `to`, or to `display` and `view` (then `to` is NULL). `look` may be NULL;
+ * it is applied to the source, in front of the view. Names as OpenColorIO takes them: aliases and roles
+ * included. */
 typedef struct rl_ocio_request {
     const char *from;
     const char *to;
@@ -70,7 +73,8 @@ rl_code rl_ocio_apply(const rl_ocio_transform *transform, float *r, float *g, fl
 /* OpenColorIO's own text for a GPU (GLSL 4.0), for a reader; in the arena. */
 rl_code rl_ocio_shader(const rl_ocio_transform *transform, rl_arena *arena, char **out, rl_error *err);
 
-/* ---- what a transform consists of ----------------------------------------------------------------------------- */
+/* ---- what a transform consists of
+ * ----------------------------------------------------------------------------- */
 
 typedef enum rl_op_kind {
     RL_OP_MATRIX,
@@ -109,15 +113,15 @@ typedef enum rl_op_fixed {
     RL_FIXED_LUV,
 } rl_op_fixed;
 
-/* One quadratic B-spline: n knots, n-1 pieces a·t² + b·t + c with t = x - knot; lines beyond both ends. n = 0: the
- * identity. */
+/* One quadratic B-spline: n knots, n-1 pieces a·t² + b·t + c with t = x - knot; lines beyond both ends. n =
+ * 0: the identity. */
 typedef struct rl_op_spline {
     size_t n;
     const float *knots, *a, *b, *c;
 } rl_op_spline;
 
-/* One operation. `inverse` turns LOG, CURVES, FIXED, POWER, MONCURVE, CDL, CONTRAST and the tables around; matrices
- * and ranges are given in the direction in which they are applied. */
+/* One operation. `inverse` turns LOG, CURVES, FIXED, POWER, MONCURVE, CDL, CONTRAST and the tables around;
+ * matrices and ranges are given in the direction in which they are applied. */
 typedef struct rl_op {
     rl_op_kind kind;
     bool inverse;
@@ -173,10 +177,11 @@ typedef struct rl_op {
 } rl_op;
 
 /* The optimized list, in the arena. Empty: the transform changes nothing. */
-rl_code rl_ocio_ops(const rl_ocio_transform *transform, rl_arena *arena, rl_op **ops, size_t *n, rl_error *err);
+rl_code rl_ocio_ops(const rl_ocio_transform *transform, rl_arena *arena, rl_op **ops, size_t *n,
+                    rl_error *err);
 
-/* Through the role aces_interchange: *linear is true when `space` is linear RGB, and then m (rows listed, column
- * vectors) takes it to ACES2065-1. False too when the config has no such role or the space is data. */
+/* Through the role aces_interchange: *linear is true when `space` is linear RGB, and then m (rows listed,
+ * column vectors) takes it to ACES2065-1. False too when the config has no such role or the space is data. */
 rl_code rl_ocio_to_aces(const rl_ocio *ocio, const char *space, bool *linear, double m[9], rl_error *err);
 
 #ifdef __cplusplus

@@ -17,15 +17,9 @@ static bool invert3(const double *m, double *out)
     double det = m[0] * c0 + m[1] * c1 + m[2] * c2;
     if (det == 0)
         return false;
-    double inverse[9] = {c0,
-                         m[2] * m[7] - m[1] * m[8],
-                         m[1] * m[5] - m[2] * m[4],
-                         c1,
-                         m[0] * m[8] - m[2] * m[6],
-                         m[2] * m[3] - m[0] * m[5],
-                         c2,
-                         m[1] * m[6] - m[0] * m[7],
-                         m[0] * m[4] - m[1] * m[3]};
+    double inverse[9] = {c0, m[2] * m[7] - m[1] * m[8], m[1] * m[5] - m[2] * m[4],
+                         c1, m[0] * m[8] - m[2] * m[6], m[2] * m[3] - m[0] * m[5],
+                         c2, m[1] * m[6] - m[0] * m[7], m[0] * m[4] - m[1] * m[3]};
     for (int i = 0; i < 9; i++)
         out[i] = inverse[i] / det;
     return true;
@@ -102,7 +96,8 @@ static void read_log_camera(const OCIO::LogCameraTransform &t, rl_op *op)
     op->u.log.has_line = t.getLinearSlopeValue(op->u.log.line_slope);
 }
 
-/* ---- curves: OpenColorIO shows the pieces that it fits to the control points only as shader uniforms --------- */
+/* ---- curves: OpenColorIO shows the pieces that it fits to the control points only as shader uniforms
+ * --------- */
 
 struct uniforms {
     const int *knot_offsets = nullptr, *piece_offsets = nullptr;
@@ -158,7 +153,10 @@ static void read_curves(rl_arena *arena, const OCIO::GradingRGBCurveTransform &t
     curves->makeDynamic();
     OCIO::GpuShaderDescRcPtr desc = OCIO::GpuShaderDesc::CreateShaderDesc();
     /* A config of its own: a shared one caches processors, and takes dynamic curves for equal. */
-    OCIO::Config::CreateRaw()->getProcessor(curves)->getOptimizedGPUProcessor(OCIO::OPTIMIZATION_NONE)->extractGpuShaderInfo(desc);
+    OCIO::Config::CreateRaw()
+        ->getProcessor(curves)
+        ->getOptimizedGPUProcessor(OCIO::OPTIMIZATION_NONE)
+        ->extractGpuShaderInfo(desc);
     uniforms found = find_uniforms(*desc);
     if (!found.knot_offsets || !found.piece_offsets || !found.knots || !found.pieces)
         return;
@@ -169,38 +167,53 @@ static void read_curves(rl_arena *arena, const OCIO::GradingRGBCurveTransform &t
     op->kind = RL_OP_CURVES;
 }
 
-/* ---- the rest -------------------------------------------------------------------------------------------------- */
+/* ---- the rest
+ * -------------------------------------------------------------------------------------------------- */
 
 static void read_fixed(const OCIO::FixedFunctionTransform &t, rl_op *op)
 {
-    switch (t.getStyle()) {
-    case OCIO::FIXED_FUNCTION_ACES_RED_MOD_03: op->u.fixed.style = RL_FIXED_RED_MOD_03; break;
-    case OCIO::FIXED_FUNCTION_ACES_RED_MOD_10: op->u.fixed.style = RL_FIXED_RED_MOD_10; break;
-    case OCIO::FIXED_FUNCTION_ACES_GLOW_03: op->u.fixed.style = RL_FIXED_GLOW_03; break;
-    case OCIO::FIXED_FUNCTION_ACES_GLOW_10: op->u.fixed.style = RL_FIXED_GLOW_10; break;
-    case OCIO::FIXED_FUNCTION_ACES_DARK_TO_DIM_10: op->u.fixed.style = RL_FIXED_DARK_TO_DIM_10; break;
-    case OCIO::FIXED_FUNCTION_ACES_GAMUT_COMP_13: op->u.fixed.style = RL_FIXED_GAMUT_COMP_13; break;
-    case OCIO::FIXED_FUNCTION_REC2100_SURROUND: op->u.fixed.style = RL_FIXED_REC2100_SURROUND; break;
-    case OCIO::FIXED_FUNCTION_RGB_TO_HSV: op->u.fixed.style = RL_FIXED_HSV; break;
-    case OCIO::FIXED_FUNCTION_XYZ_TO_xyY: op->u.fixed.style = RL_FIXED_XYY; break;
-    case OCIO::FIXED_FUNCTION_XYZ_TO_uvY: op->u.fixed.style = RL_FIXED_UVY; break;
-    case OCIO::FIXED_FUNCTION_XYZ_TO_LUV: op->u.fixed.style = RL_FIXED_LUV; break;
-    default: return;
-    }
+    static const struct {
+        OCIO::FixedFunctionStyle theirs;
+        rl_op_fixed ours;
+    } styles[] = {
+        {OCIO::FIXED_FUNCTION_ACES_RED_MOD_03,     RL_FIXED_RED_MOD_03      },
+        {OCIO::FIXED_FUNCTION_ACES_RED_MOD_10,     RL_FIXED_RED_MOD_10      },
+        {OCIO::FIXED_FUNCTION_ACES_GLOW_03,        RL_FIXED_GLOW_03         },
+        {OCIO::FIXED_FUNCTION_ACES_GLOW_10,        RL_FIXED_GLOW_10         },
+        {OCIO::FIXED_FUNCTION_ACES_DARK_TO_DIM_10, RL_FIXED_DARK_TO_DIM_10  },
+        {OCIO::FIXED_FUNCTION_ACES_GAMUT_COMP_13,  RL_FIXED_GAMUT_COMP_13   },
+        {OCIO::FIXED_FUNCTION_REC2100_SURROUND,    RL_FIXED_REC2100_SURROUND},
+        {OCIO::FIXED_FUNCTION_RGB_TO_HSV,          RL_FIXED_HSV             },
+        {OCIO::FIXED_FUNCTION_XYZ_TO_xyY,          RL_FIXED_XYY             },
+        {OCIO::FIXED_FUNCTION_XYZ_TO_uvY,          RL_FIXED_UVY             },
+        {OCIO::FIXED_FUNCTION_XYZ_TO_LUV,          RL_FIXED_LUV             },
+    };
     if (t.getNumParams() > sizeof op->u.fixed.params / sizeof(double))
         return;
     t.getParams(op->u.fixed.params);
-    op->kind = RL_OP_FIXED;
+    for (const auto &style : styles)
+        if (style.theirs == t.getStyle()) {
+            op->u.fixed.style = style.ours;
+            op->kind = RL_OP_FIXED;
+        }
 }
 
 static bool read_negative(OCIO::NegativeStyle style, rl_op_negative *out)
 {
-    switch (style) {
-    case OCIO::NEGATIVE_CLAMP: *out = RL_NEGATIVE_CLAMP; return true;
-    case OCIO::NEGATIVE_MIRROR: *out = RL_NEGATIVE_MIRROR; return true;
-    case OCIO::NEGATIVE_PASS_THRU: *out = RL_NEGATIVE_PASS; return true;
-    case OCIO::NEGATIVE_LINEAR: *out = RL_NEGATIVE_LINEAR; return true;
-    }
+    static const struct {
+        OCIO::NegativeStyle theirs;
+        rl_op_negative ours;
+    } styles[] = {
+        {OCIO::NEGATIVE_CLAMP,     RL_NEGATIVE_CLAMP },
+        {OCIO::NEGATIVE_MIRROR,    RL_NEGATIVE_MIRROR},
+        {OCIO::NEGATIVE_PASS_THRU, RL_NEGATIVE_PASS  },
+        {OCIO::NEGATIVE_LINEAR,    RL_NEGATIVE_LINEAR}
+    };
+    for (const auto &known : styles)
+        if (known.theirs == style) {
+            *out = known.ours;
+            return true;
+        }
     return false;
 }
 
@@ -274,8 +287,8 @@ static bool read_lut3d(rl_arena *arena, const OCIO::Lut3DTransform &t, rl_op *op
         t.getValue(i / (n * n), i / n % n, i % n, rgb[3 * i], rgb[3 * i + 1], rgb[3 * i + 2]);
     op->u.lut3d.n = n;
     op->u.lut3d.rgb = rgb;
-    op->u.lut3d.tetrahedral = t.getInterpolation() == OCIO::INTERP_TETRAHEDRAL ||
-                              t.getInterpolation() == OCIO::INTERP_BEST;
+    op->u.lut3d.tetrahedral =
+        t.getInterpolation() == OCIO::INTERP_TETRAHEDRAL || t.getInterpolation() == OCIO::INTERP_BEST;
     op->kind = RL_OP_LUT3D;
     return true;
 }
@@ -288,42 +301,77 @@ template <typename T> static const T &as(const OCIO::Transform &t)
 /* False when memory is out. What cannot be described stays RL_OP_OTHER. */
 static bool read_op(rl_arena *arena, const OCIO::Transform &t, rl_op *op)
 {
-    static const char *const names[] = {
-        "allocation", "built-in",      "CDL",           "colour space",      "display view",
-        "exponent",   "exponent with linear part", "exposure and contrast", "file", "fixed function",
-        "grading primary", "grading RGB curve", "grading tone", "group", "logarithm (affine)",
-        "logarithm (camera)", "logarithm", "look", "1D table", "3D table", "matrix", "range"};
+    static const char *const names[] = {"allocation",
+                                        "built-in",
+                                        "CDL",
+                                        "colour space",
+                                        "display view",
+                                        "exponent",
+                                        "exponent with linear part",
+                                        "exposure and contrast",
+                                        "file",
+                                        "fixed function",
+                                        "grading primary",
+                                        "grading RGB curve",
+                                        "grading tone",
+                                        "group",
+                                        "logarithm (affine)",
+                                        "logarithm (camera)",
+                                        "logarithm",
+                                        "look",
+                                        "1D table",
+                                        "3D table",
+                                        "matrix",
+                                        "range"};
     op->kind = RL_OP_OTHER;
     size_t type = size_t(t.getTransformType());
     op->name = type < sizeof names / sizeof *names ? names[type] : "unknown";
     op->inverse = t.getDirection() == OCIO::TRANSFORM_DIR_INVERSE;
     switch (t.getTransformType()) {
-    case OCIO::TRANSFORM_TYPE_MATRIX: read_matrix(as<OCIO::MatrixTransform>(t), op->inverse, op); break;
-    case OCIO::TRANSFORM_TYPE_RANGE: read_range(as<OCIO::RangeTransform>(t), op->inverse, op); break;
-    case OCIO::TRANSFORM_TYPE_LOG: read_log(as<OCIO::LogTransform>(t), op); break;
-    case OCIO::TRANSFORM_TYPE_LOG_AFFINE: read_log_sides(as<OCIO::LogAffineTransform>(t), op); break;
-    case OCIO::TRANSFORM_TYPE_LOG_CAMERA: read_log_camera(as<OCIO::LogCameraTransform>(t), op); break;
+    case OCIO::TRANSFORM_TYPE_MATRIX:
+        read_matrix(as<OCIO::MatrixTransform>(t), op->inverse, op);
+        break;
+    case OCIO::TRANSFORM_TYPE_RANGE:
+        read_range(as<OCIO::RangeTransform>(t), op->inverse, op);
+        break;
+    case OCIO::TRANSFORM_TYPE_LOG:
+        read_log(as<OCIO::LogTransform>(t), op);
+        break;
+    case OCIO::TRANSFORM_TYPE_LOG_AFFINE:
+        read_log_sides(as<OCIO::LogAffineTransform>(t), op);
+        break;
+    case OCIO::TRANSFORM_TYPE_LOG_CAMERA:
+        read_log_camera(as<OCIO::LogCameraTransform>(t), op);
+        break;
     case OCIO::TRANSFORM_TYPE_GRADING_RGB_CURVE:
         read_curves(arena, as<OCIO::GradingRGBCurveTransform>(t), op);
         break;
-    case OCIO::TRANSFORM_TYPE_FIXED_FUNCTION: read_fixed(as<OCIO::FixedFunctionTransform>(t), op); break;
-    case OCIO::TRANSFORM_TYPE_EXPONENT: read_power(as<OCIO::ExponentTransform>(t), op); break;
+    case OCIO::TRANSFORM_TYPE_FIXED_FUNCTION:
+        read_fixed(as<OCIO::FixedFunctionTransform>(t), op);
+        break;
+    case OCIO::TRANSFORM_TYPE_EXPONENT:
+        read_power(as<OCIO::ExponentTransform>(t), op);
+        break;
     case OCIO::TRANSFORM_TYPE_EXPONENT_WITH_LINEAR:
         read_moncurve(as<OCIO::ExponentWithLinearTransform>(t), op);
         break;
-    case OCIO::TRANSFORM_TYPE_CDL: read_cdl(as<OCIO::CDLTransform>(t), op); break;
+    case OCIO::TRANSFORM_TYPE_CDL:
+        read_cdl(as<OCIO::CDLTransform>(t), op);
+        break;
     case OCIO::TRANSFORM_TYPE_EXPOSURE_CONTRAST:
         read_contrast(as<OCIO::ExposureContrastTransform>(t), op);
         break;
-    case OCIO::TRANSFORM_TYPE_LUT1D: return read_lut1d(arena, as<OCIO::Lut1DTransform>(t), op);
-    case OCIO::TRANSFORM_TYPE_LUT3D: return read_lut3d(arena, as<OCIO::Lut3DTransform>(t), op);
-    default: break;
+    case OCIO::TRANSFORM_TYPE_LUT1D:
+        return read_lut1d(arena, as<OCIO::Lut1DTransform>(t), op);
+    case OCIO::TRANSFORM_TYPE_LUT3D:
+        return read_lut3d(arena, as<OCIO::Lut3DTransform>(t), op);
+    default:
+        break;
     }
     return true;
 }
 
-rl_code rl_shim_ops(const OCIO::GroupTransform &group, rl_arena *arena, rl_op **ops,
-                    size_t *n, rl_error *err)
+rl_code rl_shim_ops(const OCIO::GroupTransform &group, rl_arena *arena, rl_op **ops, size_t *n, rl_error *err)
 {
     int count = group.getNumTransforms();
     auto list = static_cast<rl_op *>(rl_arena_array(arena, size_t(count) + 1, sizeof(rl_op)));

@@ -7,7 +7,8 @@
 #include "graph/run/shim_ocio.h"
 
 /* May throw. */
-rl_code rl_shim_ops(const OCIO_NAMESPACE::GroupTransform &group, rl_arena *arena, rl_op **ops, size_t *n, rl_error *err);
+rl_code rl_shim_ops(const OCIO_NAMESPACE::GroupTransform &group, rl_arena *arena, rl_op **ops, size_t *n,
+                    rl_error *err);
 
 /* Inside a catch block: the exception as an error. */
 rl_code rl_shim_caught(rl_error *err);

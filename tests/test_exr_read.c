@@ -1,0 +1,320 @@
+/* Reading what relit does not write itself (tiles, levels, parts), and which values come through. */
+#include <math.h>
+#include <pthread.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "tests/exr_make.h"
+
+static rl_pool *pools[3]; /* 1, 2, 4 threads */
+
+static void good(rl_code code, const rl_error *err)
+{
+    if (code)
+        fail_msg("%s: %s: %s", rl_code_name(code), err->file, err->text);
+}
+
+/* ---- layouts that we do not write ---- */
+
+typedef struct seen {
+    const rl_exr_plane *plane;
+    int width;
+    pthread_mutex_t mutex;
+    int rows[64];
+    double sum;
+} seen;
+
+static void count_rows(void *ctx, int part, int y0, int y1)
+{
+    seen *s = ctx;
+    double sum = 0;
+    assert_int_equal(part, 1);
+    for (int y = y0; y < y1; y++)
+        for (int x = 0; x < s->width; x++)
+            sum += (double)s->plane->floats[(size_t)y * s->plane->stride + (size_t)x];
+    pthread_mutex_lock(&s->mutex);
+    s->sum += sum;
+    for (int y = y0; y < y1; y++)
+        s->rows[y]++;
+    pthread_mutex_unlock(&s->mutex);
+}
+
+/* Two parts, the second tiled, with levels, at a negative corner; every compression that the core can write.
+ */
+static void tiled_and_multipart(void **state)
+{
+    (void)state;
+    enum { W = 45, H = 37 };
+    static float a[H][W];
+    static uint16_t b[H][W];
+    static uint32_t id[H][W];
+    double sum = 0;
+    for (int y = 0; y < H; y++) {
+        for (int x = 0; x < W; x++) {
+            a[y][x] = (float)(x * 100 + y);
+            b[y][x] = made_half((float)(x - y));
+            id[y][x] = (uint32_t)(x / 4 + 1000000 * (y / 4));
+            sum += (double)a[y][x];
+        }
+    }
+    const made_channel channels[] = {
+        {"a",  RL_EXR_FLOAT, 0, a },
+        {"b",  RL_EXR_HALF,  0, b },
+        {"id", RL_EXR_UINT,  0, id}
+    };
+    for (int c = 0; c <= RL_EXR_PIZ; c++) {
+        const made_part parts[] = {
+            {"beauty", 0,   0,  W, H, RL_EXR_ZIP,            0,  false, false, channels, 3},
+            {"data",   -11, -3, W, H, (rl_exr_compression)c, 16, true,  false, channels, 3},
+        };
+        made_write(made_path("parts.exr"), parts, 2);
+        rl_exr *file;
+        rl_error err = {0};
+        good(rl_exr_open(made_path("parts.exr"), 1 << 20, &file, &err), &err);
+        assert_int_equal(rl_exr_parts(file), 2);
+        assert_int_equal(rl_exr_part_named(file, "data"), 1);
+        assert_int_equal(rl_exr_part_named(file, "nothing"), -1);
+        const rl_exr_part *part = rl_exr_part_at(file, 1);
+        assert_true(part->tiled && !part->deep && part->tile_width == 16 && part->width == W &&
+                    part->height == H);
+        assert_true(part->data_window.x0 == -11 && part->data_window.y1 == -3 + H - 1);
+        assert_int_equal(part->n_channels, 3);
+        assert_int_equal(rl_exr_channel_named(part, "b")->type, RL_EXR_HALF);
+        assert_null(rl_exr_channel_named(part, "c"));
+        for (int t = 0; t < 3; t++) {
+            static float fa[H][W], fb[H][W];
+            static uint32_t ids[H][W];
+            memset(fa, 0, sizeof fa);
+            rl_exr_plane planes[] = {
+                {.channel = "id", .ids = &ids[0][0],   .stride = W},
+                {.channel = "b",  .floats = &fb[0][0], .stride = W},
+                {.channel = "a",  .floats = &fa[0][0], .stride = W}
+            };
+            seen s = {.plane = &planes[2], .width = W, .mutex = PTHREAD_MUTEX_INITIALIZER};
+            good(rl_exr_read(file, 1, planes, 3, &(rl_exr_rows){count_rows, &s}, pools[t], &err), &err);
+            assert_memory_equal(fa, a, sizeof a);
+            assert_memory_equal(ids, id, sizeof id);
+            for (int y = 0; y < H; y++) {
+                assert_int_equal(s.rows[y], 1);
+                for (int x = 0; x < W; x++)
+                    assert_true(fb[y][x] == (float)(x - y));
+            }
+            assert_true(s.sum == sum); /* the rows were there when they were announced */
+        }
+        rl_exr_close(&file);
+    }
+}
+
+/* Levels above 0 are not looked at, a channel can be asked for twice, and the others are skipped. */
+static void one_channel_twice(void **state)
+{
+    (void)state;
+    enum { W = 33, H = 21 };
+    static uint32_t id[H * W];
+    static uint16_t b[H * W];
+    for (int i = 0; i < W * H; i++) {
+        id[i] = (uint32_t)i * 7;
+        b[i] = made_half((float)(i % 100));
+    }
+    const made_channel channels[] = {
+        {"b",  RL_EXR_HALF, 0, b },
+        {"id", RL_EXR_UINT, 0, id}
+    };
+    for (int c = RL_EXR_NONE; c <= RL_EXR_ZIP; c++) {
+        const made_part part = {NULL, 0, 0, W, H, (rl_exr_compression)c, 0, false, false, channels, 2};
+        made_write(made_path("twice.exr"), &part, 1);
+        rl_exr *file;
+        rl_error err = {0};
+        static uint32_t ids[H * W];
+        static float floats[H * W];
+        good(rl_exr_open(made_path("twice.exr"), 0, &file, &err), &err);
+        rl_exr_plane planes[] = {
+            {.channel = "id", .ids = ids,       .stride = W},
+            {.channel = "id", .floats = floats, .stride = W}
+        };
+        good(rl_exr_read(file, 0, planes, 2, NULL, NULL, &err), &err);
+        assert_memory_equal(ids, id, sizeof id);
+        for (int i = 0; i < W * H; i++)
+            assert_true(floats[i] == (float)(i * 7));
+        rl_exr_close(&file);
+    }
+}
+
+/* ---- values ---- */
+
+static void nonfinite_values(void **state)
+{
+    (void)state;
+    enum { W = 20, H = 40 };
+    static float f[H * W];
+    static uint16_t h[H * W];
+    for (int i = 0; i < W * H; i++) {
+        f[i] = i % 7 == 0 ? NAN : i % 11 == 0 ? INFINITY : i % 13 == 0 ? -INFINITY : 1.0f;
+        h[i] = i % 7 == 0 ? 0x7e01 : i % 11 == 0 ? 0x7c00 : i % 13 == 0 ? 0xfc00 : 0x3c00;
+    }
+    const made_channel channels[] = {
+        {"f", RL_EXR_FLOAT, 0, f},
+        {"h", RL_EXR_HALF,  0, h}
+    };
+    const made_part part = {NULL, 0, 0, W, H, RL_EXR_ZIPS, 0, false, false, channels, 2};
+    made_write(made_path("nan.exr"), &part, 1);
+    unsigned bad = 0, inf = 0;
+    for (int i = 0; i < W * H; i++) {
+        inf += i % 7 && i % 11 == 0;
+        bad += i % 7 == 0 || i % 11 == 0 || i % 13 == 0;
+    }
+    rl_exr *file;
+    rl_error err = {0};
+    good(rl_exr_open(made_path("nan.exr"), 0, &file, &err), &err);
+    for (int t = 0; t < 3; t++) {
+        static float out[3][H * W];
+        rl_exr_plane planes[] = {
+            {.channel = "f",      .floats = out[0], .stride = W  },
+            {                 .channel = "h",               .floats = out[1],                        .stride = W},
+            { .channel = "h", .floats = out[2],                 .stride = W,    .replace_inf = true, .inf_value = 1e10f}
+        };
+        good(rl_exr_read(file, 0, planes, 3, NULL, pools[t], &err), &err);
+        assert_int_equal(planes[0].nonfinite, bad);
+        assert_int_equal(planes[1].nonfinite, bad);
+        assert_int_equal(planes[2].nonfinite, bad - inf);
+        for (int i = 0; i < W * H; i++) {
+            bool ok = i % 7 && i % 11 && i % 13;
+            assert_true(out[0][i] == (ok ? 1.0f : 0.0f) && out[1][i] == out[0][i]);
+            assert_true(out[2][i] == (ok ? 1.0f : i % 7 && i % 11 == 0 ? 1e10f : 0.0f));
+        }
+    }
+    rl_exr_close(&file);
+}
+
+/* Writes one value at pixel (2, 1) of a 4 x 3 file with its corner at (10, 20) and reads it as an id or a
+ * float. */
+static rl_code read_value(rl_exr_pixel type, const void *value, bool as_id, uint32_t *id, float *number,
+                          rl_error *err)
+{
+    uint32_t pixels[12] = {0}, ids[12] = {0};
+    float floats[12] = {0};
+    memcpy((char *)pixels + 6 * (type == RL_EXR_HALF ? 2 : 4), value, type == RL_EXR_HALF ? 2 : 4);
+    const made_channel channel = {"v", type, 0, pixels};
+    const made_part part = {NULL, 10, 20, 4, 3, RL_EXR_ZIP, 0, false, false, &channel, 1};
+    made_write(made_path("value.exr"), &part, 1);
+    rl_exr *file;
+    *err = (rl_error){0};
+    good(rl_exr_open(made_path("value.exr"), 0, &file, err), err);
+    rl_exr_plane plane = {
+        .channel = "v", .floats = as_id ? NULL : floats, .ids = as_id ? ids : NULL, .stride = 4};
+    rl_code code = rl_exr_read(file, 0, &plane, 1, NULL, pools[1], err);
+    rl_exr_close(&file);
+    *id = ids[6];
+    *number = floats[6];
+    return code;
+}
+
+static void ids_are_integers(void **state)
+{
+    (void)state;
+    const struct {
+        float value;
+        bool ok;
+        uint32_t id;
+    } cases[] = {
+        {3,              true,  3          },
+        {16777216,       true,  16777216   },
+        {-1,             true,  0xffffffff },
+        {3e9f,           true,  3000000000u},
+        {-2147483648.0f, true,  0x80000000 },
+        {4294967040.0f,  true,  4294967040u},
+        {4294967296.0f,  false, 0          },
+        {2.5f,           false, 0          },
+        {NAN,            false, 0          },
+        {INFINITY,       false, 0          },
+        {-3e9f,          false, 0          }
+    };
+    rl_error err;
+    uint32_t id;
+    float number;
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        rl_code code = read_value(RL_EXR_FLOAT, &cases[i].value, true, &id, &number, &err);
+        assert_int_equal(code, cases[i].ok ? RL_OK : RL_E_DATA);
+        if (cases[i].ok)
+            assert_int_equal(id, cases[i].id);
+        else
+            assert_non_null(strstr(err.text, "'v'"));
+    }
+    uint16_t half = made_half(2048), bad = made_half(0.5f);
+    good(read_value(RL_EXR_HALF, &half, true, &id, &number, &err), &err);
+    assert_int_equal(id, 2048);
+    assert_int_equal(read_value(RL_EXR_HALF, &bad, true, &id, &number, &err), RL_E_DATA);
+    assert_non_null(strstr(err.text, "0.5 at pixel (12, 21)"));
+    assert_non_null(strstr(err.file, "value.exr"));
+    uint32_t exact = 0x01000000, odd = 0x01000001, most = 0xffffffff;
+    good(read_value(RL_EXR_UINT, &most, true, &id, &number, &err), &err);
+    assert_int_equal(id, 0xffffffff);
+    good(read_value(RL_EXR_UINT, &exact, false, &id, &number, &err), &err);
+    assert_true(number == 16777216.0f);
+    assert_int_equal(read_value(RL_EXR_UINT, &odd, false, &id, &number, &err), RL_E_DATA);
+    assert_non_null(strstr(err.text, "16777217 at pixel (12, 21)"));
+}
+
+static void clamping_is_counted(void **state)
+{
+    (void)state;
+    float pixels[40 * 2], back[40 * 2];
+    for (int i = 0; i < 80; i++)
+        pixels[i] = i % 10 == 0 ? 1e6f : i % 10 == 5 ? -INFINITY : 1.0f;
+    const rl_exr_source source = {"Y", RL_EXR_HALF, pixels, NULL, 2};
+    for (int c = 0; c <= RL_EXR_ZIP; c++) {
+        const rl_exr_image image = {
+            .data_window = {0, 0, 1, 39},
+            .display_window = {0, 0, 1, 39},
+            .channels = &source,
+            .n_channels = 1,
+            .compression = (rl_exr_compression)c
+        };
+        rl_error err = {0};
+        uint64_t clamped = 0;
+        rl_exr *file;
+        good(rl_exr_write(made_path("clamp.exr"), &image, pools[2], &clamped, &err), &err);
+        assert_int_equal(clamped, 16);
+        good(rl_exr_open(made_path("clamp.exr"), 0, &file, &err), &err);
+        rl_exr_plane plane = {.channel = "Y", .floats = back, .stride = 2};
+        good(rl_exr_read(file, 0, &plane, 1, NULL, NULL, &err), &err);
+        rl_exr_close(&file);
+        assert_int_equal(plane.nonfinite, 0);
+        for (int i = 0; i < 80; i++)
+            assert_true(back[i] == (i % 10 == 0 ? 65504.0f : i % 10 == 5 ? -65504.0f : 1.0f));
+    }
+}
+
+static int setup(void **state)
+{
+    (void)state;
+    rl_error err = {0};
+    for (int i = 0; i < 3; i++)
+        good(rl_pool_new(1 << i, &pools[i], &err), &err);
+    return 0;
+}
+
+static int teardown(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 3; i++)
+        rl_pool_free(&pools[i]);
+    made_clean();
+    return 0;
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(tiled_and_multipart), cmocka_unit_test(one_channel_twice),
+        cmocka_unit_test(nonfinite_values),    cmocka_unit_test(ids_are_integers),
+        cmocka_unit_test(clamping_is_counted),
+    };
+    return cmocka_run_group_tests(tests, setup, teardown);
+}
