@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "graph/base/alloc.h"
+#include "graph/base/file.h"
 #include "graph/base/text.h"
 
 /* ---- looking ---- */
@@ -58,6 +58,14 @@ const rl_value *rl_value_at(const rl_value *root, const char *path)
             return v;
         path += length + 1;
     }
+}
+
+char *rl_value_path(rl_arena *arena, const rl_value *v)
+{
+    if (!v->where.file || v->where.line == 0)
+        return rl_arena_strdup(arena, v->text);
+    char *folder = rl_path_folder(arena, v->where.file);
+    return folder ? rl_path_join(arena, folder, v->text) : NULL;
 }
 
 /* ---- printing ---- */

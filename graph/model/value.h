@@ -64,6 +64,10 @@ const char *rl_value_describe(const rl_value *v, char *buf);
 struct rl_str; /* graph/base/text.h */
 void rl_value_print(const rl_value *v, struct rl_str *out);
 
+/* The text of v as a path: relative to the file that v was read from; for a value of the command line (it has no
+ * line) relative to the working folder. NULL when memory is out. */
+char *rl_value_path(rl_arena *arena, const rl_value *v);
+
 /* ---- changing (value.c) ---- */
 
 /* over wins: maps merge key by key, everything else (lists too) replaces; null removes the key. Returns the
