@@ -49,13 +49,18 @@ $(BUILD)/tool.a: $(filter-out $(BUILD)/graph/tool/relit.o,$(TOOL_O))
 $(BUILD)/relit: $(BUILD)/graph/tool/relit.o $(BUILD)/tool.a $(BUILD)/librelit.a
 	$(CC) $(LDFLAGS) -o $@ $^ $(LIBS)
 
-$(BUILD)/tests/%: $(BUILD)/tests/%.o $(TEST_HELP_O) $(BUILD)/tool.a $(BUILD)/librelit.a
+# An archive: a test gets the helpers that it uses, and what those need.
+$(BUILD)/tests/help.a: $(TEST_HELP_O)
+	@rm -f $@
+	ar rcs $@ $^
+
+$(BUILD)/tests/%: $(BUILD)/tests/%.o $(BUILD)/tests/help.a $(BUILD)/tool.a $(BUILD)/librelit.a
 	$(CC) $(LDFLAGS) -o $@ $^ $(LIBS) -lcmocka
 
 .SECONDARY:
 -include $(shell find $(BUILD) -name '*.d' 2>/dev/null)
 
-test-build: $(TESTS)
+test-build: $(BUILD)/relit $(TESTS)
 
 test: test-build
 	@tests/run.sh $(TESTS)
