@@ -135,7 +135,7 @@ static rl_code find_bare(rl_arena *arena, const char *path, const char *presets,
     if (!out->missing)
         code = rl_manifest_bare(arena, path, match.name, presets, log, &out->manifest, err);
     if (!code && out->manifest)
-        code = rl_manifest_bind(arena, out->manifest, 0, channels, n, err);
+        code = rl_manifest_bind(arena, out->manifest, 0, first, channels, n, err);
 done:
     rl_exr_close(&file);
     return code;

@@ -164,16 +164,17 @@ static void add_materials(rl_str *out, const rl_manifest *m)
                     "capture's layers.\n"
                     "materials:\n");
     for (size_t i = 0; i < m->n_stencil_names; i++) {
-        const rl_stencil_name *s = &m->stencil_names[i];
-        const guess *g = guess_for(s->name);
+        const char *name = m->stencil_names[i].name;
+        long long id = (long long)m->stencil_names[i].id;
+        const guess *g = guess_for(name);
         rl_str_add(out, "  ");
-        if (is_name(s->name))
-            add_text(out, s->name);
+        if (is_name(name))
+            add_text(out, name);
         else
-            rl_str_printf(out, "id-%u", s->id);
-        rl_str_printf(out, ": {stencil: %u}", s->id);
+            rl_str_printf(out, "id-%lld", id);
+        rl_str_printf(out, ": {stencil: %lld}", id);
         if (g)
-            rl_str_printf(out, "    # {stencil: %u, profile: %s}", s->id, g->profile);
+            rl_str_printf(out, "    # {stencil: %lld, profile: %s}", id, g->profile);
         rl_str_add(out, "\n");
     }
     rl_str_add(out, "  default: {}    # every other id\n");
@@ -227,7 +228,7 @@ static void add_graph(rl_str *out, const char *display, const char *view)
 
 int rl_cmd_init(rl_tool *tool, rl_error *err)
 {
-    const char *path = tool->args.operand, *display, *view;
+    const char *path = tool->args.operand, *display = NULL, *view = NULL;
     rl_capture capture;
     rl_str text = {0};
     if (rl_capture_find(tool->arena, path, &tool->report->log, &capture, err))
