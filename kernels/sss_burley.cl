@@ -6,6 +6,7 @@
  * sum over taps tends to the sum over pixels of the profile's integral over the pixel's square. */
 
 #define TAP_BLOCK 64        /* taps that are turned and rounded at a time */
+#define AHEAD     8         /* taps from fetching to loading */
 #define TURNS     256       /* directions in the table */
 #define NEAR      0.8f      /* lanes share a scale from here to 1 times the farthest */
 #define MIN_WEIGHT 1e-12f      /* less in all than a sample 80 d away has: the pixel keeps its own light */
@@ -70,14 +71,16 @@ static inline floatv weight_exp2(floatv x)
     return rl_as_floatv(rl_as_intv(p) + (rl_as_intv(r) << 23)); /* magic's own low bits are 0 */
 }
 
-/* Taps first…first+n-1, n <= TAP_BLOCK: index of the vector, radius² in units of d, weight. */
+/* Taps first…first+n-1, n <= TAP_BLOCK: index of the vector, radius² in units of d, weight. There are RL_W more
+ * indices behind the last, for looking ahead. */
 static inline void place_taps(const inputs_t *in, const group_t *g, constant float *taps, int stride, int first, int n,
                               int *at, float *r2, float *weight)
 {
     const float magic = 12582912.0f;
     constant frame_t *f = in->f;
     int rows4 = f->rows >> 2;
-    for (int i = 0; i < n; i += RL_W) {
+    int i = 0;
+    for (; i < n; i += RL_W) {
         floatv x = rl_vload(0, taps + first + i), y = rl_vload(0, taps + stride + first + i);
         floatv u = fma(x, (floatv)g->turn[0], -(y * g->turn[1])), v = fma(x, (floatv)g->turn[1], y * g->turn[0]);
         intv dx = rl_as_intv(fma(u, (floatv)g->k[0], (floatv)magic)) - as_int(magic);
@@ -92,6 +95,19 @@ static inline void place_taps(const inputs_t *in, const group_t *g, constant flo
         rl_vstore(fma(x, x, y * y), 0, r2 + i);
         rl_vstore(rl_vload(0, taps + 2 * stride + first + i), 0, weight + i);
     }
+    rl_vstore((intv)g->v.at, 0, at + i);
+}
+
+/* The planes of a tap that comes soon. */
+static inline void fetch_tap(const inputs_t *in, int at)
+{
+    int plane = in->f->plane4;
+    scatter_fetch((global const float *)in->stencil + at);
+    scatter_fetch(in->depth + at);
+    AREA(scatter_fetch(in->area + at);)
+    scatter_fetch(in->diffuse + at);
+    scatter_fetch(in->diffuse + plane + at);
+    scatter_fetch(in->diffuse + 2 * plane + at);
 }
 
 /* Weighted means of n taps; lanes without a sample keep what `out` holds. */
@@ -99,14 +115,17 @@ static inline void sum_taps(const inputs_t *in, const group_t *g, constant float
 {
     int stride = (n + TAP_BLOCK - 1) / TAP_BLOCK * TAP_BLOCK, plane = in->f->plane4;
     floatv w0 = 0.0f, w1 = 0.0f, w2 = 0.0f, c0 = 0.0f, c1 = 0.0f, c2 = 0.0f;
-    int at[TAP_BLOCK];
+    int at[TAP_BLOCK + RL_W];
     float r2[TAP_BLOCK], weight[TAP_BLOCK];
     AREA(floatv per_own = 1.0f / rl_vload(0, in->area + g->v.at);)
     for (int first = 0; first < n; first += TAP_BLOCK) {
         int last = min(TAP_BLOCK, n - first);
         place_taps(in, g, taps, stride, first, last, at, r2, weight);
+        for (int i = 0; i < AHEAD; i++)
+            fetch_tap(in, at[i]);
         for (int i = 0; i < last; i++) {
             int a = at[i];
+            fetch_tap(in, at[i + AHEAD]);
             intv same = rl_as_intv(rl_vload(0, in->stencil + a)) == g->material;
             floatv dz = scatter_keep((rl_vload(0, in->depth + a) - g->z) * g->inv_d, same);
             floatv q = fma(dz, dz, g->scale2 * r2[i]), ir = rsqrt(q), r = q * ir;

@@ -6,6 +6,7 @@
 #define DEPTH_TOLERANCE 0.02f          /* of the depth: history nearer or farther shows something else */
 #define SNAP            (1.0f / 1024)  /* pixels: displacements this close to a whole number are taken as whole */
 #define COUNT_MAX       65536.0f       /* a frame's weight in a plain mean never gets below 1/COUNT_MAX */
+#define STILL           2.0f           /* the box is this much wider where nothing moves: jitter alone scatters colours */
 #define BOX_MIN         1e-6f          /* least half width of the colour box, radiance */
 
 static inline floatv tap(global const float *p, constant frame_t *f, int x, int y)
@@ -44,7 +45,7 @@ typedef struct box_t {
 /* Mean and deviation of the 3x3 neighbourhood (Salvi 2016), around the pixel's own colour, which keeps the variance from
  * cancelling. The box is grown to contain that colour: a detail as small as a pixel would else be clipped away. */
 static inline void colour_box(box_t *b, constant frame_t *f, global const float *color, const floatv *own, int x, int y,
-                              float gamma)
+                              floatv gamma)
 {
     floatv sum[3] = {0.0f, 0.0f, 0.0f}, squares[3] = {0.0f, 0.0f, 0.0f}, brightest = 0.0f, own_y[3];
     to_ycocg(own, own_y);
@@ -268,7 +269,7 @@ kernel void taa(global const float *color, global const float *depth, global con
         floatv dx, dy, then;
         box_t box;
         find_displacement(f, depth, motion, x, y, &dx, &dy, &then);
-        colour_box(&box, f, color, own, x, y, p->clip_gamma);
+        colour_box(&box, f, color, own, x, y, rl_select(p->clip_gamma, STILL * p->clip_gamma, (dx == 0.0f) & (dy == 0.0f)));
         floatv tx = dx - floor(dx), ty = dy - floor(dy);
         intv right = tx > 0.5f, below = ty > 0.5f;
         uintv id = 0, key = displacement_key(f, x, y, dx, dy);

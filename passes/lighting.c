@@ -21,12 +21,12 @@ static const rl_param profile_keys[] = {
 static const rl_param material_keys[] = {
     M(RL_F32, roughness, 0, 1, -1, "ratio",
       "perceptual roughness, alpha is its square; not given: the roughness layer, else 0.5",
-      .optional = true),
+      .no_default = true),
     M(RL_F32, specular, 0, 1, -1, "ratio",
-      "reflectance at normal incidence; not given: the specular layer, else 0.04", .optional = true),
+      "reflectance at normal incidence; not given: the specular layer, else 0.04", .no_default = true),
     M(RL_F32, metallic, 0, 1, -1, "ratio",
       "1: albedo is the specular colour and nothing is diffuse; not given: the metallic layer, else 0",
-      .optional = true),
+      .no_default = true),
 };
 
 static const rl_param shading_keys[] = {

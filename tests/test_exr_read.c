@@ -177,7 +177,7 @@ static void nonfinite_values(void **state)
         rl_exr_plane planes[] = {
             {.channel = "f",      .floats = out[0], .stride = W  },
             {                 .channel = "h",               .floats = out[1],                        .stride = W},
-            { .channel = "h", .floats = out[2],                 .stride = W,    .replace_inf = true, .inf_value = 1e10f}
+            { .channel = "h", .floats = out[2],                 .stride = W,                               .replace_inf = true, .inf_value = 1e10f}
         };
         good(rl_exr_read(file, 0, planes, 3, NULL, pools[t], &err), &err);
         assert_int_equal(planes[0].nonfinite, bad);

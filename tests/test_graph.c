@@ -5,13 +5,13 @@
 #include <string.h>
 #include <cmocka.h>
 
+#include "fake_graph.h"
 #include "graph/base/alloc.h"
 #include "graph/model/graph.h"
 
 static const rl_step one_step[] = {
     {"run", RL_EVERY_PIXEL}
 };
-#define PORT(name_, role_, format_) .name = name_, .role = role_, .format = format_
 #define FAKE(name_, ports_)                                                                                  \
     {                                                                                                        \
         .name = name_, .kernel = "f.cl", .ports = RL_ARRAY(ports_), .steps = RL_ARRAY(one_step)              \
@@ -96,9 +96,6 @@ static int teardown(void **state)
     return 0;
 }
 
-#define INPUTS(...)                                                                                          \
-    .inputs = (const rl_node_input[]){__VA_ARGS__},                                                          \
-    .n_inputs = sizeof((const rl_node_input[]){__VA_ARGS__}) / sizeof(rl_node_input)
 #define AT(line_)                                                                                            \
     {                                                                                                        \
         "p.yaml", line_, 7                                                                                   \

@@ -38,14 +38,6 @@ rl_code rl_value_need(const rl_value *map, const char *key, const char *what, co
     return rl_fail(err, RL_E_CONFIG, where, "%s '%s' needs '%s': %s", what, name, key, remedy);
 }
 
-const char *rl_value_path(rl_arena *arena, const rl_value *v)
-{
-    const char *file = v->where.file;
-    if (!file || !strncmp(file, "--", 2))
-        return v->text;
-    const char *folder = rl_path_folder(arena, file);
-    return folder ? rl_path_join(arena, folder, v->text) : NULL;
-}
 
 /* ---- nodes
  * --------------------------------------------------------------------------------------------------- */

@@ -82,10 +82,6 @@ rl_code rl_pipeline_parse(rl_arena *arena, const char *file, rl_value *root, con
 rl_code rl_pipeline_parse_from(const rl_registry *registry, rl_arena *arena, const char *file, rl_value *root,
                                const rl_log *log, const rl_pipeline **out, rl_error *err);
 
-/* The path that a text value names: relative to the file that holds the value, or as it is when the value
- * comes from the command line ("--set …"). NULL when memory is out. */
-const char *rl_value_path(rl_arena *arena, const rl_value *v);
-
 /* Expands {capture}, {frame:04}, {variant} and such in an output's file pattern; unknown names are an error.
  * {frame} is printf's %lld, {frame:04} %04lld. capture and variant may be NULL where there is none: a pattern
  * that asks for it is an error. */

@@ -32,15 +32,17 @@ static void print_bindings(const rl_plan *plan, const rl_plan_step *step, rl_str
 {
     static const rl_role roles[] = {RL_READ, RL_HISTORY, RL_WRITE};
     const rl_graph_node *node = &plan->graph->nodes[step->node];
+    const char *between = " ";
     for (size_t r = 0; r < RL_ARRAY_LENGTH(roles); r++) {
-        const char *between = roles[r] == RL_WRITE ? " -> " : "";
+        if (roles[r] == RL_WRITE)
+            between = " -> ";
         for (size_t p = 0; p < node->pass->ports.n; p++) {
             if (node->pass->ports.rows[p].role != roles[r] || step->buffers[p] < 0)
                 continue;
             const rl_buffer *b = &plan->buffers[step->buffers[p]];
-            rl_str_printf(out, "%s%s%s%s", *between ? between : " ", roles[r] == RL_HISTORY ? "past " : "",
-                          b->name, b->layout == RL_PHASE4 ? "'" : "");
-            between = "";
+            rl_str_printf(out, "%s%s%s%s", between, roles[r] == RL_HISTORY ? "past " : "", b->name,
+                          b->layout == RL_PHASE4 ? "'" : "");
+            between = ", ";
         }
     }
 }

@@ -209,7 +209,7 @@ const rl_geometry *rl_executor_geometry(const rl_executor *x)
     return &x->geometry;
 }
 
-rl_code rl_frame_buffers_new(rl_executor *x, rl_frame_buffers **out, rl_error *err)
+rl_code rl_frame_buffers_new(rl_executor *x, const rl_geometry *geometry, rl_frame_buffers **out, rl_error *err)
 {
     rl_frame_buffers *f = rl_calloc(1, sizeof *f);
     *out = f;
@@ -221,7 +221,7 @@ rl_code rl_frame_buffers_new(rl_executor *x, rl_frame_buffers **out, rl_error *e
     for (size_t i = 0; i < f->n && !code; i++) {
         const rl_buffer *b = &x->plan->buffers[i];
         if (b->kind == RL_BUFFER_SOURCE || b->kind == RL_BUFFER_SINK)
-            code = rl_memory_new(x->device, rl_buffer_bytes(b, &x->geometry), &f->memory[i], err);
+            code = rl_memory_new(x->device, rl_buffer_bytes(b, geometry), &f->memory[i], err);
     }
     if (code)
         rl_frame_buffers_free(out);

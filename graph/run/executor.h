@@ -27,7 +27,9 @@ void rl_executor_free(rl_executor **executor);
 rl_code rl_executor_resize(rl_executor *executor, const rl_geometry *geometry, rl_error *err);
 const rl_geometry *rl_executor_geometry(const rl_executor *executor);
 
-rl_code rl_frame_buffers_new(rl_executor *executor, rl_frame_buffers **out, rl_error *err);
+/* May be called while another thread runs a frame. */
+rl_code rl_frame_buffers_new(rl_executor *executor, const rl_geometry *geometry, rl_frame_buffers **out,
+                             rl_error *err);
 void rl_frame_buffers_free(rl_frame_buffers **buffers);
 /* The memory of a SOURCE or SINK buffer of the plan; NULL for others. */
 rl_memory *rl_frame_buffers_memory(const rl_frame_buffers *buffers, int buffer);

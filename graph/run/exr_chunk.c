@@ -55,8 +55,7 @@ static exr_result_t inflate_dwa(rl_exr_inflater *in)
     rl_shim_exr_block block = {.layout = in->layout,
                                .n_channels = in->info->n_channels,
                                .width = p->chunk.width,
-                               .height = p->chunk.height,
-                               .compression = (rl_exr_compression)in->info->compression};
+                               .height = p->chunk.height};
     return rl_shim_exr_decompress(&block, p->packed_buffer, p->chunk.packed_size, p->unpacked_buffer,
                                   in->message, sizeof in->message)
                ? EXR_ERR_CORRUPT_CHUNK
@@ -316,7 +315,6 @@ static rl_code deflate_dwa(rl_exr_deflater *de, const exr_chunk_info_t *chunk, c
                                .n_channels = de->image->n_channels,
                                .width = chunk->width,
                                .height = chunk->height,
-                               .compression = de->image->compression,
                                .dwa_level = de->image->dwa_level};
     de->message[0] = 0;
     *data = de->packed;

@@ -14,18 +14,24 @@
 
 /* The core hands its messages out on the thread that fails, the most telling one first. */
 static _Thread_local char said[512];
+/* Where a read ran into the end of the file; that is no error while the core looks ahead. */
+static _Thread_local char short_read[128];
 
 static void keep_message(exr_const_context_t ctx, exr_result_t code, const char *message)
 {
     (void)ctx;
     (void)code;
-    if (!said[0])
-        snprintf(said, sizeof said, "%s", message);
+    if (said[0])
+        return;
+    snprintf(said, sizeof said, "%s", message);
+    for (char *c = said; *c; c++) /* names out of broken files may hold anything */
+        if ((unsigned char)*c < 32 || (unsigned char)*c >= 127)
+            *c = '?';
 }
 
 void rl_exr_core_listen(void)
 {
-    said[0] = 0;
+    said[0] = short_read[0] = 0;
 }
 
 exr_context_initializer_t rl_exr_core_init(void)
@@ -48,6 +54,8 @@ rl_code rl_exr_core_fail(rl_error *err, const char *path, exr_result_t result, c
     else if (result == EXR_ERR_FILE_ACCESS || result == EXR_ERR_WRITE_IO)
         code = RL_E_IO;
     const char *why = said[0] ? said : exr_get_default_error_message(result);
+    if (result == EXR_ERR_READ_IO && short_read[0])
+        why = short_read;
     return rl_fail_file(err, code, path, "%s: %s", doing, why);
 }
 
@@ -67,8 +75,9 @@ static int64_t read_bytes(exr_const_context_t ctx, void *user, void *buffer, uin
             return -1;
         }
         if (n == 0) {
-            report(ctx, EXR_ERR_READ_IO, "the file ends at byte %llu, where %llu more are expected",
-                   (unsigned long long)(offset + done), (unsigned long long)(size - done));
+            snprintf(short_read, sizeof short_read,
+                     "the file ends at byte %llu, where %llu more are expected",
+                     (unsigned long long)(offset + done), (unsigned long long)(size - done));
             break;
         }
         done += (uint64_t)n;

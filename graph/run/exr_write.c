@@ -103,6 +103,26 @@ static exr_attr_box2i_t box_to(const rl_exr_box *b)
     return box;
 }
 
+/* Names beyond 31 characters set a flag in the file that readers from before 2013 refuse. */
+static bool needs_long_names(const rl_exr_image *im)
+{
+    size_t longest = 0, n = im->copy_from ? rl_exr_part_at(im->copy_from, im->copy_part)->n_attrs : 0;
+    const char *name, *type;
+    for (size_t i = 0; i < im->n_channels; i++)
+        if (strlen(im->channels[i].name) > longest)
+            longest = strlen(im->channels[i].name);
+    for (size_t i = 0; i < im->n_attrs; i++)
+        if (strlen(im->attrs[i].name) > longest)
+            longest = strlen(im->attrs[i].name);
+    for (size_t i = 0; i < n; i++) {
+        rl_exr_attr_at(im->copy_from, im->copy_part, i, &name, &type, NULL);
+        size_t length = strlen(name) > strlen(type) ? strlen(name) : strlen(type);
+        if (length > longest)
+            longest = length;
+    }
+    return longest > 31;
+}
+
 static exr_result_t describe(const job *j)
 {
     const rl_exr_image *im = j->image;
@@ -111,7 +131,7 @@ static exr_result_t describe(const job *j)
     exr_attr_v2f_t center;
     center.x = im->screen_center[0];
     center.y = im->screen_center[1];
-    exr_result_t rv = exr_set_longname_support(j->ctx, 1);
+    exr_result_t rv = exr_set_longname_support(j->ctx, needs_long_names(im));
     if (!rv)
         rv = exr_add_part(j->ctx, NULL, EXR_STORAGE_SCANLINE, &part);
     if (!rv)

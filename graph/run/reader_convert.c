@@ -8,7 +8,7 @@ static void convert_colour(rl_frame_maps *maps, const rl_binding *b, float *cons
     for (int y = rows.y0; y < rows.y1 && b->to_working; y++) {
         size_t at = (size_t)y * rows.stride;
         rl_error err = {0};
-        if (rl_ocio_apply(b->to_working, false, p[0] + at, p[1] + at, p[2] + at, (size_t)rows.width, &err)) {
+        if (rl_ocio_apply(b->to_working, p[0] + at, p[1] + at, p[2] + at, (size_t)rows.width, &err)) {
             pthread_mutex_lock(&maps->mutex);
             if (!maps->error.code)
                 maps->error = err;

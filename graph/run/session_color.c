@@ -33,8 +33,11 @@ static rl_code make_output(rl_session *s, const rl_output *spec, rl_sink_output 
     rl_code code = RL_OK;
     if (spec->display) {
         const char *view = spec->view;
+        rl_ocio_names views = {0};
         if (!view)
-            code = rl_color_default_view(s->ocio, spec->display, spec->color_where, &view, err);
+            code = rl_ocio_list_names(s->ocio, RL_OCIO_VIEWS, spec->display, &s->arena, &views, err);
+        if (views.n > 0) /* OpenColorIO lists the default first */
+            view = views.names[0];
         if (!code)
             code = rl_color_view(s->ocio, spec->display, view, spec->look, spec->color_where, err);
         request.display = spec->display;
@@ -86,7 +89,7 @@ rl_code rl_session_light_matrix(const rl_session *s, const char *space, rl_where
         rl_ocio_request request = {.from = from, .to = s->working};
         code = rl_ocio_transform_new(s->ocio, &request, &t, err);
         if (!code)
-            code = rl_ocio_apply(t, false, r, g, b, 3, err);
+            code = rl_ocio_apply(t, r, g, b, 3, err);
         rl_ocio_transform_free(&t);
     }
     for (int i = 0; i < 3; i++) {

@@ -1,5 +1,6 @@
 /* Lights of a session: which are active, which planes of the shadow layers they use, and what the kernels see of them. */
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "graph/run/session.h"
@@ -31,31 +32,42 @@ static void warn_stale(const rl_session *s, const rl_manifest *m, const rl_light
                   light->name, sqrt(d2), light->shadow_layer);
 }
 
+static const rl_layer *light_layer(const rl_manifest *m, const char *kind, const char *light)
+{
+    char name[256];
+    snprintf(name, sizeof name, "%s.%s", kind, light);
+    return rl_manifest_layer(m, name);
+}
+
+static rl_code no_such_shadow(const rl_manifest *m, const rl_light_spec *light, rl_error *err)
+{
+    rl_str text = {0};
+    const char *names[64];
+    size_t n = 0;
+    for (int i = 0; i < m->n_layers && n < 64; i++)
+        if (m->layers[i].id == RL_LAYER_SHADOW)
+            names[n++] = m->layers[i].light;
+    rl_suggest(&text, light->shadow_layer, names, n, "known");
+    rl_code code = rl_fail(err, RL_E_CONFIG, light->where, "light '%s': the capture '%s' has no layer 'shadow.%s'%s",
+                           light->name, m->name, light->shadow_layer, rl_str_text(&text));
+    rl_str_free(&text);
+    return code;
+}
+
 static rl_code bind_shadow(const rl_session *s, const rl_manifest *m, rl_active_light *a, rl_error *err)
 {
     const rl_light_spec *light = a->spec;
-    a->shadow_layer = a->thickness_layer = -1;
     if (light->shadow == RL_SHADOW_NONE)
         return RL_OK;
     if (light->shadow == RL_SHADOW_SCREEN)
         return rl_fail(err, RL_E_CONFIG, light->where,
                        "light '%s': 'shadow: screen' is not supported by this version; expected a layer's name or none",
                        light->name);
-    a->shadow_layer = rl_manifest_find_light_layer(&m->shadow, light->shadow_layer);
-    a->thickness_layer = rl_manifest_find_light_layer(&m->shadow_thickness, light->shadow_layer);
-    if (a->shadow_layer < 0 && light->shadow_named) {
-        rl_str text = {0};
-        const char *names[64];
-        size_t n = 0;
-        for (; n < m->shadow.n && n < 64; n++)
-            names[n] = m->shadow.items[n].light;
-        rl_suggest(&text, light->shadow_layer, names, n, "known");
-        rl_code code = rl_fail(err, RL_E_CONFIG, light->where, "light '%s': the capture '%s' has no layer 'shadow.%s'%s",
-                               light->name, m->name, light->shadow_layer, rl_str_text(&text));
-        rl_str_free(&text);
-        return code;
-    }
-    if (a->shadow_layer >= 0)
+    a->shadow = light_layer(m, "shadow", light->shadow_layer);
+    a->thickness = light_layer(m, "shadow_thickness", light->shadow_layer);
+    if (!a->shadow && light->shadow_named)
+        return no_such_shadow(m, light, err);
+    if (a->shadow)
         warn_stale(s, m, light);
     return RL_OK;
 }
@@ -70,21 +82,28 @@ rl_code rl_session_lights(rl_session *s, rl_sequence *q, rl_error *err)
     q->lights = rl_arena_array(&s->arena, lights.n + 1, sizeof *q->lights);
     if (!code && !q->lights)
         code = rl_fail_memory(err, lights.n * sizeof *q->lights);
-    int shadow = 0, thickness = 0;
+    const rl_layer **shadow = rl_arena_array(&s->arena, lights.n + 1, sizeof *shadow);
+    const rl_layer **thickness = rl_arena_array(&s->arena, lights.n + 1, sizeof *thickness);
+    q->light_values = rl_arena_array(&s->arena, lights.n + 1, sizeof *q->light_values);
+    if (!code && (!shadow || !thickness || !q->light_values))
+        code = rl_fail_memory(err, lights.n * sizeof *shadow);
+    q->shadow.layers = shadow;
+    q->thickness.layers = thickness;
     for (size_t i = 0; i < lights.n && !code; i++) {
         const rl_light_spec *spec = &lights.light[i];
         if (!spec->enabled)
             continue;
         rl_active_light *a = &q->lights[q->n_lights++];
         a->spec = spec;
+        a->shadow_plane = a->thickness_plane = -1;
         code = bind_shadow(s, m, a, err);
         if (!code)
             code = rl_session_light_matrix(s, spec->colorspace, spec->where, a->to_working, err);
-        a->shadow_plane = a->shadow_layer >= 0 ? shadow++ : -1;
-        a->thickness_plane = a->thickness_layer >= 0 ? thickness++ : -1;
+        if (a->shadow)
+            shadow[a->shadow_plane = q->shadow.n++] = a->shadow;
+        if (a->thickness)
+            thickness[a->thickness_plane = q->thickness.n++] = a->thickness;
     }
-    q->n_shadow = shadow;
-    q->n_thickness = thickness;
     return code;
 }
 

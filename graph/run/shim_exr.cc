@@ -87,7 +87,10 @@ Imf::PixelType pixel_type(rl_exr_pixel type)
 Imf::Header header_of(const rl_shim_exr_block &b)
 {
     Imf::Header header(b.width, b.height);
-    header.compression() = b.compression == RL_EXR_DWAA ? Imf::DWAA_COMPRESSION : Imf::DWAB_COMPRESSION;
+    /* The two differ in the height of scanline chunks only, except that the library codes DWAA tiles with
+     * deflate, which is slower and larger than the Huffman code that it has for scanlines and for DWAB tiles.
+     */
+    header.compression() = Imf::DWAB_COMPRESSION;
     if (b.dwa_level > 0)
         header.dwaCompressionLevel() = b.dwa_level;
     header.setTileDescription(Imf::TileDescription(unsigned(b.width), unsigned(b.height), Imf::ONE_LEVEL));

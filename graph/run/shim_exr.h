@@ -18,8 +18,7 @@ typedef struct rl_shim_exr_block {
     const rl_exr_layout *layout; /* sorted by name, none subsampled */
     size_t n_channels;
     int width, height;
-    rl_exr_compression compression; /* RL_EXR_DWAA or RL_EXR_DWAB */
-    float dwa_level;                /* compressing; 0 takes the library's default */
+    float dwa_level; /* compressing; 0 takes the library's default */
 } rl_shim_exr_block;
 
 /* Both return 0, or 1 with the reason in `message` (room for `room` bytes). `plain` holds rows of channels,
