@@ -1,10 +1,9 @@
 #include "graph/tool/capture.h"
 
-#include <ctype.h>
-#include <glob.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "graph/base/alloc.h"
 #include "graph/base/file.h"
 #include "graph/run/data_files.h"
 
@@ -14,100 +13,26 @@ static bool is_yaml(const char *path)
     return !strcmp(extension, ".yaml") || !strcmp(extension, ".yml");
 }
 
-/* The frame number's place in a pattern: a run of '#', or %d, %04d. NULL when there is none. */
-static const char *number_in(const char *pattern, size_t *length)
+char *rl_capture_first(rl_arena *arena, const rl_manifest *m, int pattern)
 {
-    const char *name = rl_path_name(pattern), *at = strchr(name, '#');
-    *length = at ? strspn(at, "#") : 0;
-    for (const char *percent = strchr(name, '%'); !at && percent; percent = strchr(percent + 1, '%')) {
-        size_t n = 1 + strspn(percent + 1, "0123456789");
-        if (percent[n] == 'd') {
-            at = percent;
-            *length = n + 1;
-        }
-    }
-    return at;
+    const rl_layer any = {.pattern = pattern};
+    return rl_manifest_path(arena, m, &any, m->frames.n ? m->frames.numbers[0] : 1);
 }
 
-/* Everything but the number, with glob's own characters taken literally. */
-static rl_code glob_text(rl_arena *arena, const char *pattern, const char *number, size_t length,
-                         const char **out, rl_error *err)
-{
-    rl_str text = {0};
-    for (const char *c = pattern; *c; c++) {
-        if (c == number) {
-            rl_str_add(&text, "*[0-9]");
-            c += length - 1;
-        } else {
-            if (strchr("*?[\\", *c))
-                rl_str_add(&text, "\\");
-            rl_str_addn(&text, c, 1);
-        }
-    }
-    *out = text.failed ? NULL : rl_arena_strdup(arena, rl_str_text(&text));
-    rl_str_free(&text);
-    return *out ? RL_OK : rl_fail_memory(err, strlen(pattern));
-}
-
-/* Whether what stands for the number in a match is one: "*[0-9]" takes too much. */
-static bool is_number(const char *match, const char *pattern, const char *number, size_t length)
-{
-    size_t head = (size_t)(number - pattern), tail = strlen(number + length), n = strlen(match);
-    size_t i = head + (match[head] == '-');
-    for (; i < n - tail; i++)
-        if (!isdigit((unsigned char)match[i]))
-            return false;
-    return n > head + tail;
-}
-
-rl_code rl_capture_first(rl_arena *arena, const char *pattern, const char **out, rl_error *err)
-{
-    size_t length;
-    const char *number = number_in(pattern, &length), *text;
-    glob_t found = {0};
-    *out = pattern;
-    if (!number || rl_path_exists(pattern))
-        return RL_OK;
-    rl_code code = glob_text(arena, pattern, number, length, &text, err);
-    if (code)
-        return code;
-    *out = NULL;
-    long long first = 0;
-    if (glob(text, GLOB_NOSORT, NULL, &found) == 0) {
-        for (size_t i = 0; i < found.gl_pathc; i++) {
-            const char *match = found.gl_pathv[i];
-            long long value = atoll(match + (number - pattern));
-            if (is_number(match, pattern, number, length) && (!*out || value < first)) {
-                *out = match;
-                first = value;
-            }
-        }
-    }
-    if (!*out)
-        code = rl_fail_file(err, RL_E_IO, pattern, "there is no file of this pattern");
-    else if (!(*out = rl_arena_strdup(arena, *out)))
-        code = rl_fail_memory(err, strlen(pattern));
-    globfree(&found);
-    return code;
-}
-
-rl_code rl_capture_channels(rl_arena *arena, const rl_exr *file, rl_channel **out, size_t *n, rl_error *err)
+/* All channels of an open file; names live as long as the file. */
+static rl_code list_channels(rl_arena *arena, const rl_exr *file, rl_channel **out, size_t *n, rl_error *err)
 {
     *n = 0;
     for (int p = 0; p < rl_exr_parts(file); p++)
         *n += rl_exr_part_at(file, p)->n_channels;
-    *out = rl_arena_array(arena, *n, sizeof **out);
+    *out = rl_arena_array(arena, *n + 1, sizeof **out);
     if (!*out)
         return rl_fail_memory(err, *n * sizeof **out);
-    size_t at = 0;
+    rl_channel *at = *out;
     for (int p = 0; p < rl_exr_parts(file); p++) {
         const rl_exr_part *part = rl_exr_part_at(file, p);
-        for (size_t i = 0; i < part->n_channels; i++, at++) {
-            (*out)[at].name = rl_arena_strdup(arena, part->channels[i].name);
-            (*out)[at].part = rl_arena_strdup(arena, part->name);
-            if (!(*out)[at].name || !(*out)[at].part)
-                return rl_fail_memory(err, strlen(part->name));
-        }
+        for (size_t i = 0; i < part->n_channels; i++)
+            *at++ = (rl_channel){part->name, part->channels[i].name};
     }
     return RL_OK;
 }
@@ -117,24 +42,26 @@ static rl_code find_bare(rl_arena *arena, const char *path, const char *presets,
                          rl_capture *out, rl_error *err)
 {
     rl_exr *file = NULL;
-    const char *first;
-    rl_channel *channels;
-    size_t n;
+    rl_channel *channels = NULL;
+    size_t n = 0;
     rl_preset_match match = {0};
-    rl_code code = rl_capture_first(arena, path, &first, err);
+    char *first = NULL;
+    rl_code code = rl_manifest_bare(arena, path, NULL, presets, NULL, &out->manifest, err);
+    if (!code && !(first = rl_capture_first(arena, out->manifest, 0)))
+        code = rl_fail_memory(err, strlen(path));
     if (!code)
         code = rl_exr_open(first, 0, &file, err);
     if (!code)
-        code = rl_capture_channels(arena, file, &channels, &n, err);
+        code = list_channels(arena, file, &channels, &n, err);
     if (!code)
         code = rl_preset_find(arena, presets, channels, n, &match, err);
     if (code)
         goto done;
     out->preset = match.name;
-    out->missing = match.name ? match.missing_required ? match.missing : NULL : "every layer";
+    out->missing = !match.name ? "every layer" : match.missing_required ? match.missing : NULL;
     if (!out->missing)
         code = rl_manifest_bare(arena, path, match.name, presets, log, &out->manifest, err);
-    if (!code && out->manifest)
+    if (!code && !out->missing)
         code = rl_manifest_bind(arena, out->manifest, 0, first, channels, n, err);
 done:
     rl_exr_close(&file);
@@ -157,4 +84,64 @@ rl_code rl_capture_find(rl_arena *arena, const char *path, const rl_log *log, rl
     if (!out->file)
         return rl_fail_memory(err, strlen(path));
     return rl_manifest_load(arena, path, presets, log, &out->manifest, err);
+}
+
+/* ---- stencil ---------------------------------------------------------------------------------------------
+ */
+
+/* The part that holds a layer's first channel, or -1. */
+static int part_of(const rl_exr *file, const rl_layer *layer)
+{
+    if (layer->part)
+        return rl_exr_part_named(file, layer->part);
+    for (int p = 0; p < rl_exr_parts(file); p++)
+        if (rl_exr_channel_named(rl_exr_part_at(file, p), layer->channels[0]))
+            return p;
+    return -1;
+}
+
+static int by_id(const void *a, const void *b)
+{
+    uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
+    return (x > y) - (x < y);
+}
+
+static rl_code read_ids(const rl_exr *file, const rl_layer *layer, uint32_t **out, size_t *pixels,
+                        rl_error *err)
+{
+    int part = part_of(file, layer);
+    if (part < 0)
+        return rl_fail_file(err, RL_E_FORMAT, rl_exr_path(file), "layer 'stencil' needs channel '%s'",
+                            layer->channels[0]);
+    const rl_exr_part *p = rl_exr_part_at(file, part);
+    *pixels = (size_t)p->width * (size_t)p->height;
+    *out = rl_calloc(*pixels, sizeof **out);
+    if (!*out)
+        return rl_fail_memory(err, *pixels * sizeof **out);
+    rl_exr_plane plane = {.channel = layer->channels[0], .ids = *out, .stride = (size_t)p->width};
+    return rl_exr_read(file, part, &plane, 1, NULL, NULL, err);
+}
+
+rl_code rl_capture_ids(rl_arena *arena, const rl_manifest *m, size_t most, uint32_t *out, size_t *n,
+                       rl_error *err)
+{
+    const rl_layer *layer = rl_manifest_layer(m, "stencil");
+    rl_exr *file = NULL;
+    uint32_t *ids = NULL;
+    size_t pixels = 0;
+    *n = 0;
+    if (!layer)
+        return RL_OK;
+    char *path = rl_capture_first(arena, m, layer->pattern);
+    rl_code code = path ? rl_exr_open(path, 0, &file, err) : rl_fail_memory(err, 1);
+    if (!code)
+        code = read_ids(file, layer, &ids, &pixels, err);
+    if (!code)
+        qsort(ids, pixels, sizeof *ids, by_id);
+    for (size_t i = 0; !code && i < pixels && *n < most; i++)
+        if (!i || ids[i] != ids[i - 1])
+            out[(*n)++] = ids[i];
+    rl_free(ids);
+    rl_exr_close(&file);
+    return code;
 }

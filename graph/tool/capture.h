@@ -7,21 +7,21 @@
 
 /* A manifest and where it came from. Everything lives in the arena. */
 typedef struct rl_capture {
-    rl_manifest *manifest; /* NULL: `missing` says why a bare file is not enough */
+    rl_manifest *manifest; /* of a bare file that no preset fits: files and frames, but no layers */
     const char *file;      /* the manifest's file; NULL: it was guessed from channels */
-    const char *preset;    /* that guessed it, or NULL */
-    const char *missing;   /* "stencil, albedo" when the best preset does not find all that is required */
+    const char *preset;    /* of a bare file: the one that fits best, or NULL */
+    const char *missing;   /* of a bare file: what the best preset does not find, or NULL */
 } rl_capture;
 
 /* `path`: a manifest, a folder that holds capture.yaml, an EXR file, or a pattern (#### or %04d). A bare file
- * that no preset fits is no error: manifest is NULL. */
+ * that no preset fits is no error: `missing` says so. */
 rl_code rl_capture_find(rl_arena *arena, const char *path, const rl_log *log, rl_capture *out, rl_error *err);
 
-/* The first file that a pattern stands for, or `pattern` itself when it has no number. RL_E_IO when there is
- * none. */
-rl_code rl_capture_first(rl_arena *arena, const char *pattern, const char **out, rl_error *err);
+/* The file of a pattern of the manifest at its first frame; NULL when memory is out. */
+char *rl_capture_first(rl_arena *arena, const rl_manifest *m, int pattern);
 
-/* All channels of an open file, for rl_preset_find and rl_manifest_bind. */
-rl_code rl_capture_channels(rl_arena *arena, const rl_exr *file, rl_channel **out, size_t *n, rl_error *err);
+/* The stencil ids of the first frame, ascending, each once, at most `most`. None when it has no stencil. */
+rl_code rl_capture_ids(rl_arena *arena, const rl_manifest *m, size_t most, uint32_t *out, size_t *n,
+                       rl_error *err);
 
 #endif

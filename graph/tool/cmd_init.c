@@ -89,16 +89,16 @@ static void add_lights(rl_str *out, const rl_manifest *m)
     if (m->lights.n) {
         rl_str_add(out,
                    "\n# The capture's own lights are used, as they were recorded. Uncomment to re-light:\n"
-                   "# intensity in W/sr, positions in metres, shadow: a layer, screen, or none.\n"
+                   "# intensity in W/sr, positions in metres, shadow: a layer or none.\n"
                    "#lights:\n");
         for (size_t i = 0; i < m->lights.n; i++)
             add_light(out, &m->lights.light[i]);
         return;
     }
-    rl_str_add(
-        out, "\n# The capture has no lights. One to begin with, beside the camera: intensity in W/sr.\n"
-             "lights:\n"
-             "  key: {type: point, space: camera, position: [-0.5, 0.5, 0], intensity: 2, shadow: screen}\n");
+    rl_str_add(out,
+               "\n# The capture has no lights. One to begin with, beside the camera: intensity in W/sr.\n"
+               "lights:\n"
+               "  key: {type: point, space: camera, position: [-0.5, 0.5, 0], intensity: 2, shadow: none}\n");
 }
 
 /* ---- materials -------------------------------------------------------------------------------------------
@@ -158,7 +158,8 @@ static bool is_name(const char *text)
     return text[0] && strchr(letters, text[0]) && !text[strspn(text, all)] && strcmp(text, "default");
 }
 
-static void add_materials(rl_str *out, const rl_manifest *m)
+/* `ids`: those of the first frame, for a capture that names none. */
+static void add_materials(rl_str *out, const rl_manifest *m, const uint32_t *ids, size_t n_ids)
 {
     rl_str_add(out, "\n# Stencil ids and how they are shaded. roughness and specular here win over the "
                     "capture's layers.\n"
@@ -177,6 +178,8 @@ static void add_materials(rl_str *out, const rl_manifest *m)
             rl_str_printf(out, "    # {stencil: %lld, profile: %s}", id, g->profile);
         rl_str_add(out, "\n");
     }
+    for (size_t i = 0; i < n_ids; i++)
+        rl_str_printf(out, "  id-%u: {stencil: %u}\n", ids[i], ids[i]);
     rl_str_add(out, "  default: {}    # every other id\n");
 }
 
@@ -229,17 +232,23 @@ static void add_graph(rl_str *out, const char *display, const char *view)
 int rl_cmd_init(rl_tool *tool, rl_error *err)
 {
     const char *path = tool->args.operand, *display = NULL, *view = NULL;
+    enum { MOST_IDS = 64 }; /* more would not be read; `default` catches them */
+    uint32_t ids[MOST_IDS];
+    size_t n_ids = 0;
     rl_capture capture;
     rl_str text = {0};
     if (rl_capture_find(tool->arena, path, &tool->report->log, &capture, err))
         return RL_EXIT_WRONG;
-    if (!capture.manifest) {
+    if (capture.missing) {
         rl_fail_file(
             err, RL_E_CONFIG, path,
             "no preset finds all that relit needs (%s missing); write a capture.yaml, see `relit inspect %s`",
             capture.missing, path);
         return RL_EXIT_WRONG;
     }
+    if (!capture.manifest->n_stencil_names &&
+        rl_capture_ids(tool->arena, capture.manifest, MOST_IDS, ids, &n_ids, err))
+        return RL_EXIT_WRONG;
     if (choose_view(tool->arena, &display, &view, err))
         return RL_EXIT_WRONG;
     rl_str_add(
@@ -249,7 +258,7 @@ int rl_cmd_init(rl_tool *tool, rl_error *err)
     add_text(&text, path);
     rl_str_add(&text, "    # relative to this file\n");
     add_profiles(&text, capture.manifest);
-    add_materials(&text, capture.manifest);
+    add_materials(&text, capture.manifest, ids, n_ids);
     add_lights(&text, capture.manifest);
     add_graph(&text, display, view);
     return rl_tool_print(tool, &text, err);

@@ -86,43 +86,37 @@ static rl_code print_file(const char *path, rl_str *out, rl_error *err)
 /* ---- how relit would read it ----------------------------------------------------------------------------
  */
 
-static rl_code print_mapping(rl_tool *tool, const char *path, rl_str *out, rl_error *err)
+static void print_mapping(const rl_capture *capture, rl_str *out)
+{
+    rl_str_add(out, "\n");
+    if (capture->missing) {
+        rl_str_printf(out, "# no preset finds all that relit needs: %s missing", capture->missing);
+        if (capture->preset)
+            rl_str_printf(out, " in '%s', which fits best", capture->preset);
+        rl_str_add(out, "\n# write a capture.yaml that says which channels hold albedo, normal, depth and "
+                        "stencil\n");
+        return;
+    }
+    if (capture->file)
+        rl_str_printf(out, "# %s, as relit reads it\n", capture->file);
+    else
+        rl_str_printf(out, "# guessed by preset '%s': check units and spaces, then save it as capture.yaml\n",
+                      capture->preset);
+    rl_manifest_print(capture->manifest, out);
+}
+
+/* The files of the first frame, each once, and the manifest. */
+static rl_code print_capture(rl_tool *tool, const char *path, rl_str *out, rl_error *err)
 {
     rl_capture capture;
     rl_code code = rl_capture_find(tool->arena, path, &tool->report->log, &capture, err);
-    if (code)
-        return code;
-    rl_str_add(out, "\n");
-    if (!capture.manifest) {
-        rl_str_printf(out, "# no preset finds all that relit needs: %s missing", capture.missing);
-        rl_str_add(out, capture.preset ? "" : " in each of them");
-        if (capture.preset)
-            rl_str_printf(out, " in '%s', which fits best", capture.preset);
-        rl_str_add(out, "\n# write a capture.yaml that says which channels hold albedo, normal, depth and "
-                        "stencil\n");
-        return RL_OK;
-    }
-    if (capture.file)
-        rl_str_printf(out, "# %s, as relit reads it\n", capture.file);
-    else
-        rl_str_printf(out, "# guessed by preset '%s': check units and spaces, then save it as capture.yaml\n",
-                      capture.preset);
-    rl_manifest_print(capture.manifest, out);
-    return RL_OK;
-}
-
-/* The files of a manifest's first frame, each once. */
-static rl_code print_manifest(rl_tool *tool, const char *path, rl_str *out, rl_error *err)
-{
-    rl_capture capture;
-    rl_code code = rl_capture_find(tool->arena, path, NULL, &capture, err);
     for (int i = 0; !code && i < capture.manifest->n_patterns; i++) {
-        const char *first;
-        code = rl_capture_first(tool->arena, capture.manifest->patterns[i].path, &first, err);
-        if (!code)
-            code = print_file(first, out, err);
+        char *first = rl_capture_first(tool->arena, capture.manifest, i);
+        code = first ? print_file(first, out, err) : rl_fail_memory(err, strlen(path));
     }
-    return code ? code : print_mapping(tool, path, out, err);
+    if (!code)
+        print_mapping(&capture, out);
+    return code;
 }
 
 /* ---- a folder of files ----------------------------------------------------------------------------------
@@ -188,18 +182,14 @@ static rl_code list_patterns(rl_arena *arena, const char *folder, const char ***
 
 static rl_code print_folder(rl_tool *tool, const char *folder, rl_str *out, rl_error *err)
 {
-    const char **patterns, *first;
+    const char **patterns;
     size_t n;
     rl_code code = list_patterns(tool->arena, folder, &patterns, &n, err);
     if (!code && !n)
         code = rl_fail_file(err, RL_E_IO, folder, "the folder holds no capture.yaml and no EXR file");
     for (size_t i = 0; !code && i < n; i++) {
         rl_str_printf(out, "%s%s\n", i ? "\n" : "", patterns[i]);
-        code = rl_capture_first(tool->arena, patterns[i], &first, err);
-        if (!code)
-            code = print_file(first, out, err);
-        if (!code)
-            code = print_mapping(tool, patterns[i], out, err);
+        code = print_capture(tool, patterns[i], out, err);
     }
     return code;
 }
@@ -208,20 +198,15 @@ int rl_cmd_inspect(rl_tool *tool, rl_error *err)
 {
     rl_str text = {0};
     const char *path = tool->args.operand;
-    const char *extension = rl_path_extension(path), *first;
     bool folder = rl_path_is_folder(path);
     char *manifest = folder ? rl_path_join(tool->arena, path, "capture.yaml") : NULL;
     rl_code code;
     if (folder && !manifest)
         code = rl_fail_memory(err, strlen(path));
-    else if ((folder && rl_path_exists(manifest)) || !strcmp(extension, ".yaml") ||
-             !strcmp(extension, ".yml"))
-        code = print_manifest(tool, path, &text, err);
-    else if (folder)
+    else if (folder && !rl_path_exists(manifest))
         code = print_folder(tool, path, &text, err);
-    else if (!(code = rl_capture_first(tool->arena, path, &first, err)) &&
-             !(code = print_file(first, &text, err)))
-        code = print_mapping(tool, path, &text, err);
+    else
+        code = print_capture(tool, path, &text, err);
     if (!code)
         return rl_tool_print(tool, &text, err);
     rl_str_free(&text);
