@@ -41,16 +41,26 @@ $(BUILD)/librelit.a: $(LIB_O)
 	@rm -f $@
 	ar rcs $@ $^
 
-$(BUILD)/relit: $(TOOL_O) $(BUILD)/librelit.a
+# All of the tool but main(): tests call it in their own process.
+$(BUILD)/tool.a: $(filter-out $(BUILD)/graph/tool/relit.o,$(TOOL_O))
+	@rm -f $@
+	ar rcs $@ $^
+
+$(BUILD)/relit: $(BUILD)/graph/tool/relit.o $(BUILD)/tool.a $(BUILD)/librelit.a
 	$(CC) $(LDFLAGS) -o $@ $^ $(LIBS)
 
-$(BUILD)/tests/%: $(BUILD)/tests/%.o $(TEST_HELP_O) $(BUILD)/librelit.a
+# An archive: a test gets the helpers that it uses, and what those need.
+$(BUILD)/tests/help.a: $(TEST_HELP_O)
+	@rm -f $@
+	ar rcs $@ $^
+
+$(BUILD)/tests/%: $(BUILD)/tests/%.o $(BUILD)/tests/help.a $(BUILD)/tool.a $(BUILD)/librelit.a
 	$(CC) $(LDFLAGS) -o $@ $^ $(LIBS) -lcmocka
 
 .SECONDARY:
 -include $(shell find $(BUILD) -name '*.d' 2>/dev/null)
 
-test-build: $(TESTS)
+test-build: $(BUILD)/relit $(TESTS)
 
 test: test-build
 	@tests/run.sh $(TESTS)
