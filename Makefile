@@ -27,7 +27,7 @@ LIBS    = $(shell pkg-config --libs $(PKGS)) $(shell pkg-config --libs OpenColor
 TESTS   := $(patsubst tests/%.c,$(BUILD)/tests/%,$(wildcard tests/test_*.c))
 TEST_HELP_O := $(patsubst tests/%.c,$(BUILD)/tests/%.o,$(filter-out tests/test_%.c,$(wildcard tests/*.c)))
 
-all: $(BUILD)/relit $(BUILD)/librelit.a
+all: $(BUILD)/relit $(BUILD)/librelit.a $(BUILD)/relit_oiio.so
 
 $(BUILD)/%.o: %.c
 	@mkdir -p $(@D)
@@ -41,6 +41,12 @@ $(BUILD)/librelit.a: $(LIB_O)
 	@rm -f $@
 	ar rcs $@ $^
 
+$(BUILD)/relit_oiio.so: $(MODULE_CXX:%.cc=$(BUILD)/%.o)
+	$(CXX) $(LDFLAGS) -shared -o $@ $^ $(shell pkg-config --libs OpenImageIO)
+
+# Where `make install` puts the module; it is also found beside the program.
+$(BUILD)/graph/run/image_module.o: CPPFLAGS += -DRL_MODULE_DIR='"$(PREFIX)/lib/relit"'
+
 $(BUILD)/relit: $(TOOL_O) $(BUILD)/librelit.a
 	$(CC) $(LDFLAGS) -o $@ $^ $(LIBS)
 
@@ -50,7 +56,8 @@ $(BUILD)/tests/%: $(BUILD)/tests/%.o $(TEST_HELP_O) $(BUILD)/librelit.a
 .SECONDARY:
 -include $(shell find $(BUILD) -name '*.d' 2>/dev/null)
 
-test-build: $(TESTS)
+test-build: $(TESTS) $(BUILD)/relit_oiio.so
+$(BUILD)/tests/test_image_file: | $(BUILD)/relit_oiio.so
 
 test: test-build
 	@tests/run.sh $(TESTS)
