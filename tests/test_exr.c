@@ -247,6 +247,36 @@ static void threads_change_nothing(void **state)
     picture_free(&out);
 }
 
+static void clamping_is_counted(void **state)
+{
+    (void)state;
+    float pixels[40 * 2], back[40 * 2];
+    for (int i = 0; i < 80; i++)
+        pixels[i] = i % 10 == 0 ? 1e6f : i % 10 == 5 ? -INFINITY : 1.0f;
+    const rl_exr_source source = {"Y", RL_EXR_HALF, pixels, NULL, 2};
+    for (int c = 0; c <= RL_EXR_ZIP; c++) {
+        const rl_exr_image image = {
+            .data_window = {0, 0, 1, 39},
+            .display_window = {0, 0, 1, 39},
+            .channels = &source,
+            .n_channels = 1,
+            .compression = (rl_exr_compression)c
+        };
+        rl_error err = {0};
+        uint64_t clamped = 0;
+        rl_exr *file;
+        good(rl_exr_write(made_path("clamp.exr"), &image, pools[2], &clamped, &err), &err);
+        assert_int_equal(clamped, 16);
+        good(rl_exr_open(made_path("clamp.exr"), 0, &file, &err), &err);
+        rl_exr_plane plane = {.channel = "Y", .floats = back, .stride = 2};
+        good(rl_exr_read(file, 0, &plane, 1, NULL, NULL, &err), &err);
+        rl_exr_close(&file);
+        assert_int_equal(plane.nonfinite, 0);
+        for (int i = 0; i < 80; i++)
+            assert_true(back[i] == (i % 10 == 0 ? 65504.0f : i % 10 == 5 ? -65504.0f : 1.0f));
+    }
+}
+
 static int setup(void **state)
 {
     (void)state;
@@ -271,6 +301,7 @@ int main(void)
         cmocka_unit_test(round_trips),
         cmocka_unit_test(core_reads_the_same),
         cmocka_unit_test(threads_change_nothing),
+        cmocka_unit_test(clamping_is_counted),
     };
     return cmocka_run_group_tests(tests, setup, teardown);
 }

@@ -44,8 +44,7 @@ typedef struct rl_exr_box {
     int x0, y0, x1, y1;
 } rl_exr_box;
 
-/* ---- reading ----------------------------------------------------------------------------------------------
- */
+/* ---- reading ---- */
 
 typedef struct rl_exr_channel {
     const char *name; /* with its layer: "albedo.R" */
@@ -114,8 +113,7 @@ typedef struct rl_exr_rows {
 rl_code rl_exr_read(const rl_exr *file, int part, rl_exr_plane *planes, size_t n_planes,
                     const rl_exr_rows *rows, rl_pool *pool, rl_error *err);
 
-/* ---- attributes -------------------------------------------------------------------------------------------
- */
+/* ---- attributes ---- */
 
 typedef enum rl_exr_type {
     RL_EXR_T_OTHER, /* has a printable form, no numbers */
@@ -159,8 +157,7 @@ void rl_exr_attr_at(const rl_exr *file, int part, size_t i, const char **name, c
  * the C locale, shortest; long or binary values are abbreviated. */
 void rl_exr_attr_print(const rl_exr *file, int part, size_t i, rl_str *out);
 
-/* ---- writing ----------------------------------------------------------------------------------------------
- */
+/* ---- writing ---- */
 
 /* A channel to be written. `floats` for half and float, `ids` for uint. */
 typedef struct rl_exr_source {
@@ -200,9 +197,9 @@ typedef struct rl_exr_image {
 
 /* Writes a single-part scanline file: a temporary name beside `path`, renamed when complete; after an error
  * nothing is left of it. Values beyond ±65504 (after rounding) that go into half channels are clamped and
- * counted in *clamped (may be NULL); NaN stays NaN. The file has the same bytes for every thread count (not
- * on every machine: ISA-L's output depends on the processor's vector width, its content does not). Errors:
- * RL_E_USAGE (a bad image), RL_E_IO, RL_E_MEMORY. `pool` may be NULL. */
+ * counted in *clamped (may be NULL); NaN stays NaN. The file has the same bytes for every thread count
+ * (across machines RL_EXR_LEVEL_FAST promises the same pixels only: ISA-L has other code for other
+ * processors). Errors: RL_E_USAGE (a bad image), RL_E_IO, RL_E_MEMORY. `pool` may be NULL. */
 rl_code rl_exr_write(const char *path, const rl_exr_image *image, rl_pool *pool, uint64_t *clamped,
                      rl_error *err);
 
