@@ -373,7 +373,7 @@ static int setup(void **state)
         floats[i] = (float)(i / W) + 0.1f;
         words[i] = i % 9 ? (uint32_t)(i / 50) : made_random(&seed) >> 8;
     }
-    return rl_pool_new(2, &pool, &err);
+    return rl_pool_new(2, &pool, &err) != RL_OK;
 }
 
 static int teardown(void **state)

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #if defined(__x86_64__)
+#include <cpuid.h>
 #include <immintrin.h>
 #define RL_X86 1
 #define VECTOR __attribute__((target("avx2,f16c,popcnt")))
@@ -344,7 +345,8 @@ static const rl_exr_kernels kernels_avx2 = {
 const rl_exr_kernels *rl_exr_kernels_best(void)
 {
 #ifdef RL_X86
-    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("f16c"))
+    unsigned a, b, c, d; /* F16C by hand: not every compiler's __builtin_cpu_supports knows it */
+    if (__builtin_cpu_supports("avx2") && __get_cpuid(1, &a, &b, &c, &d) && (c & bit_F16C))
         return &kernels_avx2;
 #endif
     return &rl_exr_kernels_portable;
