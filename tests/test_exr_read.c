@@ -344,6 +344,32 @@ static void ids_are_integers(void **state)
     assert_non_null(strstr(err.text, "16777217 at pixel (12, 21)"));
 }
 
+/* The limit holds for one channel when a file is opened, and for all that are read together. */
+static void limits(void **state)
+{
+    (void)state;
+    fill_tiles();
+    const made_part part = {NULL, 0, 0, TILES_W, TILES_H, RL_EXR_ZIP, 0, false, false, tile_channels, 3};
+    const uint64_t plane = sizeof tiles_a;
+    made_write(made_path("limit.exr"), &part, 1);
+    rl_exr *file;
+    rl_error err = {0};
+    assert_int_equal(rl_exr_open(made_path("limit.exr"), plane - 1, &file, &err), RL_E_MEMORY);
+    assert_null(file);
+    err = (rl_error){0};
+    good(rl_exr_open(made_path("limit.exr"), plane, &file, &err), &err);
+    static float a[TILES_H][TILES_W];
+    rl_exr_plane one = {.channel = "a", .floats = &a[0][0], .stride = TILES_W};
+    assert_int_equal(rl_exr_read(file, 0, &one, 1, NULL, NULL, &err), RL_E_MEMORY);
+    assert_non_null(strstr(err.text, "limit"));
+    rl_exr_close(&file);
+    err = (rl_error){0};
+    good(rl_exr_open(made_path("limit.exr"), plane * 6, &file, &err), &err);
+    good(rl_exr_read(file, 0, &one, 1, NULL, NULL, &err), &err);
+    assert_memory_equal(a, tiles_a, sizeof a);
+    rl_exr_close(&file);
+}
+
 static int setup(void **state)
 {
     (void)state;
@@ -367,7 +393,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(tiled_and_multipart), cmocka_unit_test(tiled_dwa),
         cmocka_unit_test(one_channel_twice),   cmocka_unit_test(nonfinite_values),
-        cmocka_unit_test(ids_are_integers),
+        cmocka_unit_test(ids_are_integers),    cmocka_unit_test(limits),
     };
     return cmocka_run_group_tests(tests, setup, teardown);
 }

@@ -84,11 +84,13 @@ int rl_exr_part_named(const rl_exr *file, const char *name);
 const rl_exr_channel *rl_exr_channel_named(const rl_exr_part *part, const char *name);
 
 /* One channel to be read, and where to. Exactly one of `floats` and `ids` is given.
- *   floats: half and float as they are, uint as the number (one that a float cannot hold is RL_E_DATA).
- *           NaN and infinities become 0 and are counted; with `replace_inf`, +Inf becomes inf_value instead
- * and is not counted (renderers write it where depth is empty). ids:    uint as it is; half and float must be
- * integral and within int32 or uint32, else RL_E_DATA names the pixel and the value; a negative id keeps its
- * 32 bits. */
+ *
+ * As floats, half and float come as they are and uint as the number (one that a float cannot hold is
+ * RL_E_DATA). NaN and infinities become 0 and are counted; with `replace_inf`, +Inf becomes inf_value instead
+ * and is not counted (renderers write it where depth is empty).
+ *
+ * As ids, uint comes as it is; half and float must be integral and within int32 or uint32, else RL_E_DATA
+ * names the pixel and the value. A negative id keeps its 32 bits. */
 typedef struct rl_exr_plane {
     const char *channel;
     float *floats;
