@@ -4,15 +4,19 @@
 #include "passes/burley.h"
 
 typedef struct sss_reference_params {
+    int32_t orientation;
     int32_t weighting;
 } sss_reference_params;
 
 static const rl_param params[] = {
+    P_ENUM(sss_reference_params, orientation, "screen|tangent", 0,
+           "the disk is parallel to the screen, or to the tangent plane that the depth gives",
+           .structural = true),
     P_ENUM(sss_reference_params, weighting, "area|plain", 0,
            "what a sample stands for: the surface that its pixel sees, or its pixel alone",
            .structural = true),
 };
-RL_PARAMS_MATCH(sss_reference_params, 1);
+RL_PARAMS_MATCH(sss_reference_params, 2);
 
 static const rl_port ports[] = {
     {"diffuse",            RL_READ,                   RL_RGB,                     .help = "radiance below the surface", .layout = RL_PHASE4},

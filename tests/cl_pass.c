@@ -10,7 +10,7 @@
 #include "graph/base/alloc.h"
 #include "graph/base/text.h"
 
-#define KEPT 32
+#define KEPT    32
 #define OPTIONS "-cl-std=CL1.2 -cl-mad-enable -cl-no-signed-zeros -cl-finite-math-only"
 
 struct cl_session {
@@ -142,8 +142,8 @@ static void move_image(const frame_t *f, const rl_port *port, float *device, con
 static const cl_image *image_of(const cl_job *job, const rl_port *port)
 {
     for (size_t i = 0; i < job->n_images; i++)
-        if (!strcmp(job->images[i].port, port->name) && (port->role == RL_READ ? !job->images[i].write
-                                                                                : !!job->images[i].write))
+        if (!strcmp(job->images[i].port, port->name) &&
+            (port->role == RL_READ ? !job->images[i].write : !!job->images[i].write))
             return &job->images[i];
     return NULL;
 }
@@ -285,12 +285,13 @@ static bool add_buffer(cl_session *s, cl_args *a, void *data, size_t bytes)
     return !failed("clCreateBuffer", code);
 }
 
-static double run_kernel(cl_session *s, cl_kernel kernel, cl_uint dims, const size_t *global, const size_t *local)
+static double run_kernel(cl_session *s, cl_kernel kernel, cl_uint dims, const size_t *global,
+                         const size_t *local)
 {
     cl_event event;
     cl_ulong begin = 0, end = 0;
-    if (failed("clEnqueueNDRangeKernel", clEnqueueNDRangeKernel(s->queue, kernel, dims, NULL, global, local, 0,
-                                                                NULL, &event)))
+    if (failed("clEnqueueNDRangeKernel",
+               clEnqueueNDRangeKernel(s->queue, kernel, dims, NULL, global, local, 0, NULL, &event)))
         return -1;
     clWaitForEvents(1, &event);
     clGetEventProfilingInfo(event, CL_PROFILING_COMMAND_START, sizeof begin, &begin, NULL);
@@ -352,11 +353,13 @@ bool cl_run(cl_session *s, const cl_job *job)
     for (size_t i = 0; ok && i < pass->ports.n; i++) {
         const rl_port *port = &pass->ports.rows[i];
         planes[i] = make_plane(job, port);
-        ok = (planes[i] || port->optional) && add_buffer(s, &args, planes[i], floats_of(job->frame, port) * 4);
+        ok =
+            (planes[i] || port->optional) && add_buffer(s, &args, planes[i], floats_of(job->frame, port) * 4);
         if (port->layout == RL_LINEAR && ok && planes[i]) { /* the kernel's pointer is behind the guard */
             cl_buffer_region region = {RL_GUARD * 4, (floats_of(job->frame, port) - RL_GUARD) * 4};
             cl_int code;
-            cl_mem part = clCreateSubBuffer(args.mem[args.n - 1], 0, CL_BUFFER_CREATE_TYPE_REGION, &region, &code);
+            cl_mem part =
+                clCreateSubBuffer(args.mem[args.n - 1], 0, CL_BUFFER_CREATE_TYPE_REGION, &region, &code);
             ok = !failed("clCreateSubBuffer", code);
             clReleaseMemObject(args.mem[args.n - 1]);
             args.mem[args.n - 1] = part;
@@ -417,8 +420,8 @@ double cl_run_text(cl_session *s, const char *text, const char *entry, const cl_
     }
     for (size_t i = 0; i < n; i++)
         if (buffers[i].write && failed("clEnqueueReadBuffer",
-                                       clEnqueueReadBuffer(s->queue, args.mem[i], CL_TRUE, 0, buffers[i].bytes,
-                                                           buffers[i].data, 0, NULL, NULL)))
+                                       clEnqueueReadBuffer(s->queue, args.mem[i], CL_TRUE, 0,
+                                                           buffers[i].bytes, buffers[i].data, 0, NULL, NULL)))
             best = -1;
 done:
     for (cl_uint i = 0; i < args.n; i++)
