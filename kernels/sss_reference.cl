@@ -70,11 +70,11 @@ static inline void gather(const inputs_t *in, const centre_t *at, int dx, int dy
     floatv rise = at->tilt_x * x + at->tilt_y * y;
     disk2 += z2 * rise * rise;
 #endif
-    intv near = mine & (disk2 <= at->reach * at->reach);
-    if (!scatter_any(near))
-        return;
     int i = scatter_at(in->f, &at->v, dx, dy);
-    intv same = near & (rl_as_intv(rl_vload(0, in->stencil + i)) == at->material);
+    intv near = mine & (disk2 <= at->reach * at->reach);
+    intv same = near & (rl_as_intv(rl_vload(0, in->stencil + i)) == at->material), counts = near & (same | at->keep);
+    if (!scatter_any(counts))
+        return;
     floatv dz = scatter_keep(rl_vload(0, in->depth + i) - at->z, same), w[3];
     int ring = max(abs(dx), abs(dy));
     if (ring == 0)
@@ -90,7 +90,7 @@ static inline void gather(const inputs_t *in, const centre_t *at, int dx, int dy
 #if P_weighting == WEIGHTING_AREA
         w[c] *= surface;
 #endif
-        w[c] = scatter_keep(w[c], near & (same | at->keep));
+        w[c] = scatter_keep(w[c], counts);
         s->w[c] += w[c];
         s->c[c] = fma(w[c], scatter_keep(rl_vload(0, in->diffuse + c * in->f->plane4 + i), same), s->c[c]);
     }

@@ -124,7 +124,7 @@ static double run_ours(cl_session *session, const scene *s, int taps, int repeat
     };
     double ms[3] = {0};
     cl_job job = {
-        &rl_pass_sss_burley, &s->frame, &params, materials, sizeof materials, images, 7, repeat, ms, NULL};
+        &rl_pass_sss_burley, &s->frame, &params, materials, sizeof materials, images, 7, repeat, ms, 0};
     return cl_run(session, &job) ? ms[0] + ms[1] + ms[2] : -1;
 }
 

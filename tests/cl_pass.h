@@ -39,9 +39,9 @@ typedef struct cl_job {
     size_t materials_bytes;
     const cl_image *images;
     size_t n_images;
-    int repeat;          /* runs, at least one; the fastest is reported */
-    double *ms;          /* one a step, or NULL */
-    const char *options; /* more build options, or NULL */
+    int repeat; /* runs, at least one; the fastest is reported */
+    double *ms; /* one a step, or NULL */
+    int width;  /* RL_W; 0 = 16 */
 } cl_job;
 
 bool cl_run(cl_session *s, const cl_job *job);

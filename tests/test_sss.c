@@ -26,6 +26,7 @@ enum { SCREEN = 0, TANGENT = 1 };
 enum { AREA = 0, PLAIN = 1, AUTO = -1 };
 
 static cl_session *session;
+static int vector_width; /* of the vectors; 0 = as always */
 
 /* ---- scenes ---- */
 
@@ -163,7 +164,8 @@ static void run(scene *s, const rl_pass *pass, const void *params, cl_session *o
                   .materials = materials,
                   .materials_bytes = sizeof materials,
                   .images = images,
-                  .n_images = 8};
+                  .n_images = 8,
+                  .width = vector_width};
     assert_true(cl_run(on, &job));
 }
 
@@ -558,6 +560,54 @@ static void crop_gives_the_same_bits(void **state)
     scene_free(&part);
 }
 
+/* Narrower vectors, for devices that want them. Of a flat surface: groups of lanes are others there. */
+static void width_does_not_matter(void **state)
+{
+    (void)state;
+    scene s = scene_make(37, 11, 150, 61, 400);
+    scene_flat(&s, 1, 0.4f, 1);
+    uint32_t seed = 4;
+    for (size_t i = 0; i < 3 * s.n; i++)
+        s.diffuse[i] = next_random(&seed);
+    float *want = new_planes(6 * s.n);
+    for (vector_width = 16; vector_width >= 4; vector_width /= 2) {
+        run_burley(&s, 21, AREA);
+        for (size_t i = 0; i < 3 * s.n; i++)
+            assert_true(vector_width == 16 || fabsf(s.color[i] - want[i]) < 1e-5f);
+        memcpy(want, s.color, 3 * s.n * sizeof *want);
+        run_reference(&s, AREA);
+        for (size_t i = 0; i < 3 * s.n; i++)
+            assert_true(vector_width == 16 || fabsf(s.color[i] - want[3 * s.n + i]) < 1e-5f);
+        memcpy(want + 3 * s.n, s.color, 3 * s.n * sizeof *want);
+    }
+    vector_width = 0;
+    rl_free(want);
+    scene_free(&s);
+}
+
+/* Patterns for a number of taps and for `auto`; memory that runs out is an error, not a crash. */
+static void tables_are_made(void **state)
+{
+    (void)state;
+    rl_arena arena = {0};
+    rl_tables tables;
+    rl_error err = {0};
+    burley_params p = {.taps = 100};
+    rl_pass_input in = {.params = &p};
+    assert_int_equal(rl_pass_sss_burley.tables(&in, &arena, &tables, &err), RL_OK);
+    assert_int_equal(tables.n, 512 + 3 * 128);
+    assert_true(fabsf(hypotf(tables.data[100], tables.data[101]) - 1) < 1e-6f);
+    p.taps = AUTO;
+    assert_int_equal(rl_pass_sss_burley.tables(&in, &arena, &tables, &err), RL_OK);
+    assert_int_equal(tables.n, 512 + 3 * 64 + 3 * 64);
+    rl_arena_free(&arena);
+    rl_alloc_fail_at(1, 1);
+    assert_int_equal(rl_pass_sss_burley.tables(&in, &arena, &tables, &err), RL_E_MEMORY);
+    rl_alloc_fail_at(0, 0);
+    assert_int_equal(err.code, RL_E_MEMORY);
+    rl_arena_free(&arena);
+}
+
 static int open_session(void **state)
 {
     (void)state;
@@ -587,6 +637,8 @@ int main(void)
         cmocka_unit_test(detail_blends),
         cmocka_unit_test(bits_do_not_depend_on_threads),
         cmocka_unit_test(crop_gives_the_same_bits),
+        cmocka_unit_test(width_does_not_matter),
+        cmocka_unit_test(tables_are_made),
     };
     return cmocka_run_group_tests(tests, open_session, close_session);
 }
