@@ -54,6 +54,8 @@ static rl_code check_name(const rl_ocio *ocio, rl_ocio_list list, const char *of
     rl_arena arena = {0};
     rl_ocio_names names;
     bool found = false;
+    if (!name)
+        return rl_fail(err, RL_E_CONFIG, where, "a %s is needed", what);
     rl_code code = rl_ocio_list_names(ocio, list, of, &arena, &names, err);
     for (size_t i = 0; code == RL_OK && i < names.n; i++)
         found = found || strcmp(names.names[i], name) == 0;
