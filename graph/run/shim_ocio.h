@@ -83,6 +83,7 @@ typedef enum rl_op_kind {
     RL_OP_MONCURVE,
     RL_OP_CDL,
     RL_OP_CONTRAST,
+    RL_OP_PRIMARY,
     RL_OP_LUT1D,
     RL_OP_LUT3D,
     RL_OP_OTHER, /* exists in OpenColorIO, has no description here */
@@ -160,6 +161,11 @@ typedef struct rl_op {
             int style; /* 0 linear, 1 video, 2 logarithmic */
             double exposure, contrast, gamma, pivot, log_step, log_grey;
         } contrast;
+        struct { /* x + offset; (x - pivot)·slope + pivot; a power of (x - black)/range that keeps the sign,
+                    times range,
+                    + black; saturation; clamp */
+            double offset[3], slope[3], pivot, power[3], black, range, saturation, low, high;
+        } primary;
         struct { /* n entries of RGB; domain 0..1, or every half-float bit pattern (n = 65536) */
             size_t n;
             const float *rgb;
