@@ -173,6 +173,62 @@ static void test_spaces_match(void **state)
     }
 }
 
+/* No transform that the shipped config can be asked for needs a table. */
+static void test_config_is_whole(void **state)
+{
+    rl_arena arena = {0};
+    rl_ocio_names spaces, displays, views;
+    (void)state;
+    assert_int_equal(rl_ocio_validate(config, NULL), RL_OK);
+    assert_int_equal(rl_ocio_list_names(config, RL_OCIO_SPACES, NULL, &arena, &spaces, NULL), RL_OK);
+    assert_int_equal(rl_ocio_list_names(config, RL_OCIO_DISPLAYS, NULL, &arena, &displays, NULL), RL_OK);
+    assert_int_equal(spaces.n, 9);
+    assert_int_equal(displays.n, 2);
+    for (size_t i = 0; i < spaces.n; i++) {
+        for (size_t k = 0; k < spaces.n; k++)
+            assert_false(make_pass(config, &(rl_ocio_request){.from = spaces.names[i], .to = spaces.names[k]},
+                                   &arena, NULL)
+                             .baked);
+        for (size_t d = 0; d < displays.n; d++) {
+            assert_int_equal(
+                rl_ocio_list_names(config, RL_OCIO_VIEWS, displays.names[d], &arena, &views, NULL), RL_OK);
+            assert_int_equal(views.n, 3);
+            for (size_t v = 0; v < views.n; v++) {
+                rl_ocio_request request = {
+                    .from = spaces.names[i], .display = displays.names[d], .view = views.names[v]};
+                assert_false(make_pass(config, &request, &arena, NULL).baked);
+            }
+        }
+    }
+    rl_arena_free(&arena);
+}
+
+/* Every allocation fails once: an error or, where it was not needed, the same program; no crash, no leak. */
+static void test_out_of_memory(void **state)
+{
+    static const rl_ocio_request request = {.from = "ACEScg", .display = "sRGB", .view = "ACES"};
+    rl_arena kept = {0};
+    rl_color_pass want = make_pass(config, &request, &kept, NULL);
+    int failures = 0;
+    (void)state;
+    for (unsigned long n = 1; n < 300; n++) {
+        rl_arena arena = {0};
+        rl_color_pass pass;
+        rl_alloc_fail_at(n, 0);
+        rl_code code = rl_color_pass_new(config, &request, false, RL_NOWHERE, &arena, NULL, &pass, NULL);
+        rl_alloc_fail_at(0, 0);
+        if (code == RL_OK)
+            assert_string_equal(pass.pass->kernel_text, want.pass->kernel_text);
+        else
+            assert_int_equal(code, RL_E_MEMORY);
+        failures += code != RL_OK;
+        rl_arena_free(&arena);
+    }
+    print_message("# %d allocations\n", failures);
+    assert_true(failures > 20);
+    rl_arena_free(&kept);
+}
+
 static void test_no_change_no_pass(void **state)
 {
     static const rl_ocio_request raw = {.from = "lin_rec709", .display = "sRGB", .view = "Raw"};
@@ -584,6 +640,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_views_match),
         cmocka_unit_test(test_spaces_match),
+        cmocka_unit_test(test_config_is_whole),
+        cmocka_unit_test(test_out_of_memory),
         cmocka_unit_test(test_no_change_no_pass),
         cmocka_unit_test(test_exposure),
         cmocka_unit_test(test_same_bits),

@@ -15,21 +15,6 @@
 #include "graph/base/file.h"
 #include "graph/run/image_file.h"
 
-/* AddressSanitizer's leak check guesses wrong where libraries that are loaded late keep thread-local storage,
- * and dies of it; without that guess it takes OpenImageIO's last error message (a C++ string per thread) for
- * lost. It asks a program for options by these names. */
-const char *__asan_default_options(void);
-const char *__asan_default_options(void)
-{
-    return "intercept_tls_get_addr=0";
-}
-
-const char *__lsan_default_suppressions(void);
-const char *__lsan_default_suppressions(void)
-{
-    return "leak:basic_string*_M_assign\n";
-}
-
 #define WIDTH  37 /* odd, smaller than the stride */
 #define HEIGHT 29
 #define STRIDE 40

@@ -39,10 +39,11 @@ size_t rl_color_table_add(rl_color_text *t, const float *values, size_t n)
 /* "fma(b, K(…), …)" for one row; a coefficient of 0 costs nothing. */
 static void emit_row(rl_str *s, const double *m, double offset, int row)
 {
-    rl_str sum = {0}, next = {0};
+    rl_str sum = {0};
     if (offset != 0)
         rl_str_printf(&sum, "K(%s)", RL_LIT(offset));
     for (int c = 0; c < 3; c++) {
+        rl_str next = {0};
         if (m[c] == 0)
             continue;
         if (sum.length == 0 && m[c] == 1)
@@ -53,9 +54,9 @@ static void emit_row(rl_str *s, const double *m, double offset, int row)
             rl_str_printf(&next, "%c + %s", channel[c], rl_str_text(&sum));
         else
             rl_str_printf(&next, "fma(%c, K(%s), %s)", channel[c], RL_LIT(m[c]), rl_str_text(&sum));
+        s->failed = s->failed || sum.failed || next.failed;
         rl_str_free(&sum);
         sum = next;
-        next = (rl_str){0};
     }
     rl_str_printf(s, "        floatv n%c = %s;\n", channel[row], sum.length ? rl_str_text(&sum) : "K(0.0f)");
     s->failed = s->failed || sum.failed;

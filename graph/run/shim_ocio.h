@@ -23,6 +23,10 @@ typedef struct rl_ocio_transform rl_ocio_transform; /* a processor made from one
 rl_code rl_ocio_open(const char *path, rl_ocio **out, rl_error *err);
 void rl_ocio_free(rl_ocio **ocio);
 
+/* Consistent as a whole (views name spaces that exist, and so on)? For `relit check` and tests; opening does
+ * not ask, so that a config with one broken view can still be used for the others. */
+rl_code rl_ocio_validate(const rl_ocio *ocio, rl_error *err);
+
 /* ---- names ------------------------------------------------------------------------------------------- */
 
 typedef enum rl_ocio_list {
