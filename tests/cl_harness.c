@@ -69,8 +69,7 @@ const char *cl_harness_error(const cl_harness *h)
     return h ? h->error : "no OpenCL device";
 }
 
-/* ---- programs
- * ---------------------------------------------------------------------------------------------------- */
+/* ---- programs ---------------------------------------------------------------------------------------- */
 
 static void add_params(rl_str *s, const rl_pass *pass)
 {
@@ -150,8 +149,7 @@ void cl_harness_release(cl_kernel_of_pass **k)
     *k = NULL;
 }
 
-/* ---- running
- * ----------------------------------------------------------------------------------------------------- */
+/* ---- running ----------------------------------------------------------------------------------------- */
 
 frame_t cl_harness_frame(int columns, int rows)
 {

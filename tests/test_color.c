@@ -40,8 +40,7 @@ static int teardown(void **state)
     return 0;
 }
 
-/* ---- running a pass
- * ------------------------------------------------------------------------------------------ */
+/* ---- running a pass ---------------------------------------------------------------------------------- */
 
 /* Colours between low and high: most of them dark, a tenth below 0 if low is, channels independent so that
  * saturated colours are frequent; the first ones are exact greys and primaries. */
@@ -130,8 +129,7 @@ static difference compare(const rl_ocio *ocio, const rl_ocio_request *request, c
     return d;
 }
 
-/* ---- the configuration that ships
- * -------------------------------------------------------------------------------- */
+/* ---- the configuration that ships -------------------------------------------------------------------- */
 
 static void test_views_match(void **state)
 {
@@ -225,8 +223,7 @@ static void test_same_bits(void **state)
     rl_arena_free(&arena);
 }
 
-/* ---- every generator
- * ----------------------------------------------------------------------------------------------- */
+/* ---- every generator --------------------------------------------------------------------------------- */
 
 typedef struct op_case {
     const char *transform; /* YAML, as from_scene_reference */
@@ -240,56 +237,56 @@ typedef struct op_case {
 /* clang-format off: version 14 crashes on this table */
 static const op_case ops[] = {
     {"!<MatrixTransform> {matrix: [0.5, 0.2, 0, 0, 0, 1, 0, 0, 0.1, 0, 0.9, 0, 0, 0, 0, 1], offset: [0.1, 0, "
-     "-1, 0]}",                                                                                                                                                                                               -1,                                                                                                                                                                                   20,1e-6},
-    {                                                                                                   "!<MatrixTransform> {matrix: [0.5, 0.2, 0, 0, 0, 1, 0, 0, 0.1, 0, 0.9, 0, 0, 0, 0, 1], offset: [0.1, 0, "
+     "-1, 0]}",                                                                                      -1,   20,  1e-6},
+    {"!<MatrixTransform> {matrix: [0.5, 0.2, 0, 0, 0, 1, 0, 0, 0.1, 0, 0.9, 0, 0, 0, 0, 1], offset: [0.1, 0, "
      "-1, 0], "
-     "direction: inverse}",                                                                                                                                                                                                      -1,                                                                                                                                                                                                                                                                                                                                                                         20,1e-6},
-    {                                                                                                "!<RangeTransform> {min_in_value: 0.1, max_in_value: 4, min_out_value: 0, max_out_value: 1}",                                                                                                                                                                                                 -1,                                                                                                                                                                                          20,
-     1e-6},
-    {                                                                                               "!<LogTransform> {base: 10}",                                                                                                                                                                                                  -0.1,                                                                                                                                                                                                                                                            20,1e-6},
-    {                                                                                               "!<LogTransform> {base: 2, direction: inverse}",                                                                                                                                                                                                 -4,                                                                                                                                                                                                                                        8,1e-6},
-    {                                                                                                 "!<LogAffineTransform> {base: 10, log_side_slope: 0.3, log_side_offset: 0.6, lin_side_slope: [1.1, 1, "
+     "direction: inverse}",                                                                          -1,   20,  1e-6},
+    {"!<RangeTransform> {min_in_value: 0.1, max_in_value: 4, min_out_value: 0, max_out_value: 1}",        -1,   20,
+     1e-6                                                                                                                },
+    {"!<LogTransform> {base: 10}",                                                                        -0.1, 20,  1e-6},
+    {"!<LogTransform> {base: 2, direction: inverse}",                                                     -4,   8,   1e-6},
+    {"!<LogAffineTransform> {base: 10, log_side_slope: 0.3, log_side_offset: 0.6, lin_side_slope: [1.1, 1, "
      "0.9], "
-     "lin_side_offset: 0.01}",                                                                                                                                                                                                 -0.1,                                                                                                                                                                                                                                                                                                                                                                                      20,3e-6},
-    {                                                                                                "!<LogCameraTransform> {base: 10, log_side_slope: 0.25, log_side_offset: 0.4, lin_side_slope: 5, "
-     "lin_side_offset: 0.05, lin_side_break: 0.01}",                                                                                                                                                                                               -0.1,20,1e-6},
-    {                                                                                                  "!<LogCameraTransform> {base: 10, log_side_slope: 0.25, log_side_offset: 0.4, lin_side_slope: 5, "
-     "lin_side_offset: 0.05, lin_side_break: 0.01, linear_slope: 4, direction: inverse}",                                                                                                                                                                                               -0.1,                                                                                                                                                                                                                                                                                                                                                                                      1.1,                                                                                                                                                   3e-6},
-    {                                                                                                  "!<ExponentTransform> {value: 2.2}",                                                                                                                                                                                              -0.1,4,1e-6},
-    {                                                                                                  "!<ExponentTransform> {value: [2.2, 1, 1.8, 1], style: mirror, direction: inverse}",                                                                                                                                                                                                -1,                                                                                                                                                                                                                                                                                                                                                                                        4,                                                                                                                                                                                                                                                                                                                                                                                                                                                                                              1e-6},
-    {                                                                                                  "!<ExponentTransform> {value: [0.4, 2, 1.5, 1], style: pass_thru}",                                                                                                                                                                                                -1,4,1e-6},
-    {                                                                                                  "!<ExponentWithLinearTransform> {gamma: 2.4, offset: 0.055}",                                                                                                                                                                                                -0.1,                                                                                                                                                                                                                                                                                                                                                                                        2,                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                               1e-6},
-    {                                                                                               "!<ExponentWithLinearTransform> {gamma: 2.4, offset: 0.055, style: mirror, direction: inverse}",                                                                                                                                                                                                -1,4,
-     1e-6},
-    {                                                                               "!<CDLTransform> {slope: [1.1, 1, 0.9], offset: [0.01, -0.02, 0], power: [1.2, 1, 0.8], saturation: "
-     "0.8}",                                                                                                                                                                                                    -0.1,                                                                                                                                                                                                                                                                                                                                                                                        4,3e-6},
-    {                                                                                                    "!<CDLTransform> {slope: [1.1, 1, 0.9], offset: [0.01, -0.02, 0], power: [1.2, 1, 0.8], sat: 1.2, "
+     "lin_side_offset: 0.01}",                                                                       -0.1, 20,  3e-6},
+    {"!<LogCameraTransform> {base: 10, log_side_slope: 0.25, log_side_offset: 0.4, lin_side_slope: 5, "
+     "lin_side_offset: 0.05, lin_side_break: 0.01}",                                                 -0.1, 20,  1e-6},
+    {"!<LogCameraTransform> {base: 10, log_side_slope: 0.25, log_side_offset: 0.4, lin_side_slope: 5, "
+     "lin_side_offset: 0.05, lin_side_break: 0.01, linear_slope: 4, direction: inverse}",            -0.1, 1.1, 3e-6},
+    {"!<ExponentTransform> {value: 2.2}",                                                                 -0.1, 4,   1e-6},
+    {"!<ExponentTransform> {value: [2.2, 1, 1.8, 1], style: mirror, direction: inverse}",                 -1,   4,   1e-6},
+    {"!<ExponentTransform> {value: [0.4, 2, 1.5, 1], style: pass_thru}",                                  -1,   4,   1e-6},
+    {"!<ExponentWithLinearTransform> {gamma: 2.4, offset: 0.055}",                                        -0.1, 2,   1e-6},
+    {"!<ExponentWithLinearTransform> {gamma: 2.4, offset: 0.055, style: mirror, direction: inverse}",     -1,   4,
+     1e-6                                                                                                                },
+    {"!<CDLTransform> {slope: [1.1, 1, 0.9], offset: [0.01, -0.02, 0], power: [1.2, 1, 0.8], saturation: "
+     "0.8}",                                                                                         -0.1, 4,   3e-6},
+    {"!<CDLTransform> {slope: [1.1, 1, 0.9], offset: [0.01, -0.02, 0], power: [1.2, 1, 0.8], sat: 1.2, "
      "style: asc, "
-     "direction: inverse}",-0.1,1.5,3e-6},
-    {                                                                                                   "!<ExposureContrastTransform> {style: linear, exposure: 0.5, contrast: 1.3, gamma: 1, pivot: 0.18}",
-     -0.1,                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                             4,                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                                    1e-5},
-    {                                                                                                   "!<ExposureContrastTransform> {style: video, exposure: -1, contrast: 0.7, gamma: 1.1, pivot: 0.18, "
-     "direction: inverse}",                                                                                                                                                                                                    -0.1,1.5,1e-5},
-    {                                                                                                   "!<ExposureContrastTransform> {style: log, exposure: 1, contrast: 0.7, gamma: 1.1, pivot: 0.18}",                                                                                                                                                                                   -0.1,
-     1.5,1e-6},
-    {                                                                                                   "!<GradingRGBCurveTransform> " GRADE ", master: " POINTS "}",   -10, 10,3e-6},
-    {                                                                                                   "!<GradingRGBCurveTransform> " GRADE ", direction: inverse}",                                       -5,                                                                                                                                                                                                                      5,3e-5},
-    {                                                                                                   "!<GradingRGBCurveTransform> {style: linear, master: " POINTS "}",                                       -0.1,                                                                                                                                                                                   20,3e-5},
-    {                                                                                                   "!<FixedFunctionTransform> {style: ACES_Glow03}",                                  -0.1,                                                                                                                                                                            4,1e-6},
-    {                                                                                                   "!<FixedFunctionTransform> {style: ACES_Glow10, direction: inverse}",                                                   -0.1,                                                                                                                                                                                                  4,1e-6},
-    {                                                                                                   "!<FixedFunctionTransform> {style: ACES_RedMod03}",                               -0.1,                                                                                                                                                             4,1e-5},
-    {                                                                                                   "!<FixedFunctionTransform> {style: ACES_RedMod03, direction: inverse}",                                                 0,                                                                                                                                                                                                   4,1e-5},
-    {                                                                                                   "!<FixedFunctionTransform> {style: ACES_RedMod10, direction: inverse}",                             0,                                                                                                                                                                4,1e-5},
-    {                                                                                                   "!<FixedFunctionTransform> {style: ACES_DarkToDim10, direction: inverse}",                             -0.1,                                                                                                                                                                                    4,1e-6},
-    {                                                                                                   "!<FixedFunctionTransform> {style: REC2100_Surround, params: [0.78]}",                          -0.1,                                                                                                                                                                              4,1e-6},
-    {                                                                                                   "!<BuiltinTransform> {style: ACES-LMT - ACES 1.3 Reference Gamut Compression}",                              -0.1,                                                                                                                                                                                     20,3e-5},
-    {                                                                                                   "!<BuiltinTransform> {style: ACES-LMT - ACES 1.3 Reference Gamut Compression, direction: inverse}",                     0,                                                                                                                                                                        2,
-     3e-3}, /* has a pole */
-    {                                                                                                   "!<BuiltinTransform> {style: CURVE - LINEAR_to_ST-2084}", -0.1,                                                                                                                                                                100,1e-5},
-    {                                                                                                   "!<BuiltinTransform> {style: ADX10_to_ACES2065-1}",                                           0,                                                                                                                                                                                                                           1,1e-4},
-    {                                                                                                   "!<FileTransform> {src: curve.spi1d}",                                                 -0.1,                                                                                                                                                                                          2,1e-6},
-    {                                                      "!<FileTransform> {src: cube.cube, interpolation: tetrahedral}",                                                              -0.1,                                                                                                                                                                                              1.2,1e-6},
-    {                                                                                                    "!<FileTransform> {src: cube.cube, interpolation: linear}",                                                                                 -0.1,                                                                                                                                                                                                    1.2,1e-6},
+     "direction: inverse}",                                                                          -0.1, 1.5, 3e-6},
+    {"!<ExposureContrastTransform> {style: linear, exposure: 0.5, contrast: 1.3, gamma: 1, pivot: 0.18}",
+     -0.1,                                                                                                      4,   1e-5},
+    {"!<ExposureContrastTransform> {style: video, exposure: -1, contrast: 0.7, gamma: 1.1, pivot: 0.18, "
+     "direction: inverse}",                                                                          -0.1, 1.5, 1e-5},
+    {"!<ExposureContrastTransform> {style: log, exposure: 1, contrast: 0.7, gamma: 1.1, pivot: 0.18}",    -0.1,
+     1.5,                                                                                                            1e-6},
+    {"!<GradingRGBCurveTransform> " GRADE ", master: " POINTS "}",                                        -10,  10,  3e-6},
+    {"!<GradingRGBCurveTransform> " GRADE ", direction: inverse}",                                        -5,   5,   3e-5},
+    {"!<GradingRGBCurveTransform> {style: linear, master: " POINTS "}",                                   -0.1, 20,  3e-5},
+    {"!<FixedFunctionTransform> {style: ACES_Glow03}",                                                    -0.1, 4,   1e-6},
+    {"!<FixedFunctionTransform> {style: ACES_Glow10, direction: inverse}",                                -0.1, 4,   1e-6},
+    {"!<FixedFunctionTransform> {style: ACES_RedMod03}",                                                  -0.1, 4,   1e-5},
+    {"!<FixedFunctionTransform> {style: ACES_RedMod03, direction: inverse}",                              0,    4,   1e-5},
+    {"!<FixedFunctionTransform> {style: ACES_RedMod10, direction: inverse}",                              0,    4,   1e-5},
+    {"!<FixedFunctionTransform> {style: ACES_DarkToDim10, direction: inverse}",                           -0.1, 4,   1e-6},
+    {"!<FixedFunctionTransform> {style: REC2100_Surround, params: [0.78]}",                               -0.1, 4,   1e-6},
+    {"!<BuiltinTransform> {style: ACES-LMT - ACES 1.3 Reference Gamut Compression}",                      -0.1, 20,  3e-5},
+    {"!<BuiltinTransform> {style: ACES-LMT - ACES 1.3 Reference Gamut Compression, direction: inverse}",  0,    2,
+     3e-3                                                                                                                }, /* has a pole */
+    {"!<BuiltinTransform> {style: CURVE - LINEAR_to_ST-2084}",                                            -0.1, 100, 1e-5},
+    {"!<BuiltinTransform> {style: ADX10_to_ACES2065-1}",                                                  0,    1,   1e-4},
+    {"!<FileTransform> {src: curve.spi1d}",                                                               -0.1, 2,   1e-6},
+    {"!<FileTransform> {src: cube.cube, interpolation: tetrahedral}",                                     -0.1, 1.2, 1e-6},
+    {"!<FileTransform> {src: cube.cube, interpolation: linear}",                                          -0.1, 1.2, 1e-6},
 };
 /* clang-format on */
 
@@ -370,8 +367,7 @@ static void test_every_operation(void **state)
     assert_int_equal(bad, 0);
 }
 
-/* ---- what has no generator
- * ------------------------------------------------------------------------------------------- */
+/* ---- what has no generator --------------------------------------------------------------------------- */
 
 static void count_warning(void *ctx, rl_severity severity, rl_where where, const char *text)
 {
@@ -403,8 +399,7 @@ static void test_bakes_and_says_so(void **state)
     remove_folder(folder);
 }
 
-/* ---- the vector functions
- * --------------------------------------------------------------------------------------------- */
+/* ---- the vector functions ---------------------------------------------------------------------------- */
 
 /* Three planes of results from one of arguments: log2, exp2, the hue's weight with red = 1 and green =
  * tangent. */
@@ -465,8 +460,7 @@ static void test_functions(void **state)
     rl_free(in);
 }
 
-/* ---- names and primaries
- * ---------------------------------------------------------------------------------------------- */
+/* ---- names and primaries ----------------------------------------------------------------------------- */
 
 static void test_names(void **state)
 {

@@ -7,8 +7,7 @@
 #include "graph/run/color_bake.h"
 #include "graph/run/color_emit.h"
 
-/* ---- names
- * ---------------------------------------------------------------------------------------------------- */
+/* ---- names ------------------------------------------------------------------------------------------- */
 
 /* "… has no <what> 'name'; did you mean …? known: …", with the names of a list. */
 static rl_code unknown(const rl_ocio *ocio, rl_ocio_list list, const char *of, const char *what,
@@ -91,8 +90,7 @@ static rl_code check_request(const rl_ocio *ocio, const rl_ocio_request *request
     return code;
 }
 
-/* ---- the pass
- * --------------------------------------------------------------------------------------------------- */
+/* ---- the pass ---------------------------------------------------------------------------------------- */
 
 static const rl_param params[] = {
     P(rl_color_params, RL_F32, exposure, -64, 64, 0, "stops", "colours are multiplied by 2^exposure first"),

@@ -17,8 +17,7 @@
 extern "C" {
 #endif
 
-/* ---- names, with errors that help
- * --------------------------------------------------------------------------- */
+/* ---- names, with errors that help -------------------------------------------------------------------- */
 
 /* The space that `name` (name, alias or role) stands for; unknown: an error at `where` with the nearest
  * names. *out lives as long as the configuration. Thread-safe. */
@@ -32,8 +31,7 @@ rl_code rl_color_view(const rl_ocio *ocio, const char *display, const char *view
 /* The working space when the pipeline names none: the role scene_linear. */
 rl_code rl_color_working(const rl_ocio *ocio, rl_where where, const char **out, rl_error *err);
 
-/* ---- a transform as a pass
- * ------------------------------------------------------------------------------------ */
+/* ---- a transform as a pass --------------------------------------------------------------------------- */
 
 /* The parameters of the pass. */
 typedef struct rl_color_params {
@@ -54,8 +52,7 @@ typedef struct rl_color_pass {
 rl_code rl_color_pass_new(const rl_ocio *ocio, const rl_ocio_request *request, bool exposed, rl_where where,
                           rl_arena *arena, const rl_log *log, rl_color_pass *out, rl_error *err);
 
-/* ---- primaries
- * ---------------------------------------------------------------------------------------------------- */
+/* ---- primaries --------------------------------------------------------------------------------------- */
 
 typedef struct rl_primaries {
     bool known;       /* the space is linear RGB; xy and name are only set then */

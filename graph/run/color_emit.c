@@ -34,8 +34,7 @@ size_t rl_color_table_add(rl_color_text *t, const float *values, size_t n)
     return start;
 }
 
-/* ---- matrix, range
- * ------------------------------------------------------------------------------------------ */
+/* ---- matrix, range ----------------------------------------------------------------------------------- */
 
 /* "fma(b, K(…), …)" for one row; a coefficient of 0 costs nothing. */
 static void emit_row(rl_str *s, const double *m, double offset, int row)
@@ -88,8 +87,7 @@ static bool emit_range(rl_color_text *t, const rl_op *op)
     return true;
 }
 
-/* ---- logarithms
- * ------------------------------------------------------------------------------------------------ */
+/* ---- logarithms -------------------------------------------------------------------------------------- */
 
 /* The line below the break, in the log's direction: value = slope·x + offset, and where it ends on both axes.
  */
@@ -158,8 +156,7 @@ static bool emit_log(rl_color_text *t, const rl_op *op)
     return true;
 }
 
-/* ---- powers
- * ---------------------------------------------------------------------------------------------------- */
+/* ---- powers ------------------------------------------------------------------------------------------ */
 
 static bool emit_power(rl_color_text *t, const rl_op *op)
 {
@@ -234,8 +231,7 @@ static bool emit_moncurve(rl_color_text *t, const rl_op *op)
     return true;
 }
 
-/* ---- grading
- * ----------------------------------------------------------------------------------------------------- */
+/* ---- grading ----------------------------------------------------------------------------------------- */
 
 static double reciprocal(double x)
 {
@@ -331,8 +327,7 @@ static bool emit_contrast(rl_color_text *t, const rl_op *op)
     return true;
 }
 
-/* ---- all of them
- * --------------------------------------------------------------------------------------------------- */
+/* ---- all of them ------------------------------------------------------------------------------------- */
 
 bool rl_color_emit(rl_color_text *t, const rl_op *op)
 {

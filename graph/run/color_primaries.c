@@ -32,8 +32,7 @@ static const named_primaries known[] = {
     {"CIE XYZ, D65",      {1, 0, 0, 1, 0, 0, 1.0 / 3, 1.0 / 3},                                     {WHITE_D65}},
 };
 
-/* ---- 3x3, rows listed, column vectors
- * ------------------------------------------------------------------------ */
+/* ---- 3x3, rows listed, column vectors ---------------------------------------------------------------- */
 
 static void multiply(const double a[9], const double b[9], double out[9])
 {

@@ -79,8 +79,7 @@ extern "C" void rl_ocio_free(rl_ocio **ocio)
     destroy(ocio);
 }
 
-/* ---- names
- * -------------------------------------------------------------------------------------------------- */
+/* ---- names ------------------------------------------------------------------------------------------- */
 
 static int count_names(const OCIO::Config &config, rl_ocio_list what, const char *of)
 {
@@ -158,8 +157,7 @@ extern "C" bool rl_ocio_is_data(const rl_ocio *ocio, const char *name)
     }
 }
 
-/* ---- transforms
- * --------------------------------------------------------------------------------------------- */
+/* ---- transforms -------------------------------------------------------------------------------------- */
 
 static OCIO::ConstProcessorRcPtr make_processor(const OCIO::Config &config, const rl_ocio_request *request)
 {
@@ -256,8 +254,7 @@ extern "C" rl_code rl_ocio_ops(const rl_ocio_transform *transform, rl_arena *are
     }
 }
 
-/* ---- primaries
- * ------------------------------------------------------------------------------------------------ */
+/* ---- primaries --------------------------------------------------------------------------------------- */
 
 static bool linear_matrix(const rl_op *ops, size_t n, double m[9])
 {

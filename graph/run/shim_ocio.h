@@ -23,8 +23,7 @@ typedef struct rl_ocio_transform rl_ocio_transform; /* a processor made from one
 rl_code rl_ocio_open(const char *path, rl_ocio **out, rl_error *err);
 void rl_ocio_free(rl_ocio **ocio);
 
-/* ---- names
- * -------------------------------------------------------------------------------------------------- */
+/* ---- names ------------------------------------------------------------------------------------------- */
 
 typedef enum rl_ocio_list {
     RL_OCIO_SPACES, /* colour spaces, of scene and display, inactive ones included */
@@ -49,8 +48,7 @@ const char *rl_ocio_space(const rl_ocio *ocio, const char *name);
 /* The colour space holds numbers that are not colours (`isdata`). */
 bool rl_ocio_is_data(const rl_ocio *ocio, const char *space);
 
-/* ---- transforms
- * --------------------------------------------------------------------------------------------- */
+/* ---- transforms -------------------------------------------------------------------------------------- */
 
 /* From `from` to the colour space `to`, or to `display` and `view` (then `to` is NULL). `look` may be NULL;
  * it is applied to the source, in front of the view. Names as OpenColorIO takes them: aliases and roles
@@ -73,8 +71,7 @@ rl_code rl_ocio_apply(const rl_ocio_transform *transform, float *r, float *g, fl
 /* OpenColorIO's own text for a GPU (GLSL 4.0), for a reader; in the arena. */
 rl_code rl_ocio_shader(const rl_ocio_transform *transform, rl_arena *arena, char **out, rl_error *err);
 
-/* ---- what a transform consists of
- * ----------------------------------------------------------------------------- */
+/* ---- what a transform consists of -------------------------------------------------------------------- */
 
 typedef enum rl_op_kind {
     RL_OP_MATRIX,

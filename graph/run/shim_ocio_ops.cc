@@ -96,8 +96,8 @@ static void read_log_camera(const OCIO::LogCameraTransform &t, rl_op *op)
     op->u.log.has_line = t.getLinearSlopeValue(op->u.log.line_slope);
 }
 
-/* ---- curves: OpenColorIO shows the pieces that it fits to the control points only as shader uniforms
- * --------- */
+/* ---- curves: OpenColorIO shows the pieces that it fits to the control points only as shader uniforms ----
+ */
 
 struct uniforms {
     const int *knot_offsets = nullptr, *piece_offsets = nullptr;
@@ -167,8 +167,7 @@ static void read_curves(rl_arena *arena, const OCIO::GradingRGBCurveTransform &t
     op->kind = RL_OP_CURVES;
 }
 
-/* ---- the rest
- * -------------------------------------------------------------------------------------------------- */
+/* ---- the rest ---------------------------------------------------------------------------------------- */
 
 static void read_fixed(const OCIO::FixedFunctionTransform &t, rl_op *op)
 {

@@ -1,0 +1,194 @@
+#include "graph/run/shim_oiio.h"
+
+#include <OpenImageIO/imageio.h>
+
+#include <cstdio>
+#include <exception>
+#include <memory>
+#include <string>
+
+#define EXPORT __attribute__((visibility("default")))
+
+struct rl_oiio_file {
+    std::unique_ptr<OIIO::ImageInput> input;
+    std::string text; /* what the last attribute call gave out */
+};
+
+static int failed(const std::string &why, char *message, size_t size)
+{
+    snprintf(message, size, "%s", why.empty() ? "OpenImageIO does not say why" : why.c_str());
+    for (char *p = message; *p; p++)
+        if (*p == '\n')
+            *p = p[1] ? ' ' : 0;
+    return 1;
+}
+
+/* Inside a catch block. */
+static int caught(char *message, size_t size)
+{
+    try {
+        throw;
+    } catch (const std::exception &e) {
+        return failed(e.what(), message, size);
+    } catch (...) {
+        return failed("", message, size);
+    }
+}
+
+static OIIO::TypeDesc type_of(rl_oiio_type type)
+{
+    static const OIIO::TypeDesc types[] = {OIIO::TypeUInt8, OIIO::TypeUInt16, OIIO::TypeHalf,
+                                           OIIO::TypeFloat};
+    return types[type];
+}
+
+static OIIO::ImageSpec spec_of(const rl_oiio_image *image)
+{
+    OIIO::ImageSpec spec(image->width, image->height, image->channels, type_of(image->type));
+    spec.x = image->x;
+    spec.y = image->y;
+    spec.full_x = image->display[0];
+    spec.full_y = image->display[1];
+    spec.full_width = image->display[2];
+    spec.full_height = image->display[3];
+    for (size_t i = 0; i < image->attributes_n; i++) {
+        const rl_oiio_attribute &a = image->attributes[i];
+        if (a.text)
+            spec.attribute(a.name, a.text);
+        else
+            spec.attribute(a.name, a.number);
+    }
+    return spec;
+}
+
+static int write_image(const rl_oiio_image *image, char *message, size_t size)
+{
+    try {
+        std::unique_ptr<OIIO::ImageOutput> output = OIIO::ImageOutput::create(image->format);
+        if (!output)
+            return failed(OIIO::geterror(), message, size);
+        if (!output->supports("alpha") && (image->channels == 2 || image->channels == 4))
+            return failed("the format has no alpha channel", message, size);
+        bool wide = image->type == RL_OIIO_HALF || image->type == RL_OIIO_FLOAT;
+        if (!output->open(image->path, spec_of(image)) ||
+            !output->write_image(wide ? OIIO::TypeFloat : type_of(image->type), image->pixels) ||
+            !output->close())
+            return failed(output->geterror(), message, size);
+        return 0;
+    } catch (...) {
+        return caught(message, size);
+    }
+}
+
+/* "bmp:bmp;jpeg:jpg,jpeg;…" by format becomes "bmp,jpg,jpeg,…" of the formats that can be written. */
+static std::string list_writable()
+{
+    std::string all(OIIO::get_string_attribute("extension_list")), out;
+    std::string formats = "," + std::string(OIIO::get_string_attribute("output_format_list")) + ",";
+    for (size_t start = 0; start < all.size();) {
+        size_t end = std::min(all.find(';', start), all.size()), colon = all.find(':', start);
+        if (colon < end && formats.find("," + all.substr(start, colon - start) + ",") != std::string::npos)
+            out += (out.empty() ? "" : ",") + all.substr(colon + 1, end - colon - 1);
+        start = end + 1;
+    }
+    return out;
+}
+
+static const char *writable()
+{
+    try {
+        static const std::string list = list_writable();
+        return list.c_str();
+    } catch (...) {
+        return "";
+    }
+}
+
+static rl_oiio_type nearest_type(OIIO::TypeDesc type)
+{
+    switch (type.basetype) {
+    case OIIO::TypeDesc::UINT8:
+    case OIIO::TypeDesc::INT8:
+        return RL_OIIO_U8;
+    case OIIO::TypeDesc::HALF:
+        return RL_OIIO_HALF;
+    case OIIO::TypeDesc::UINT16:
+    case OIIO::TypeDesc::INT16:
+        return RL_OIIO_U16;
+    default:
+        return RL_OIIO_FLOAT;
+    }
+}
+
+static void fill_info(const OIIO::ImageSpec &spec, rl_oiio_info *info)
+{
+    std::string names;
+    for (const std::string &name : spec.channelnames)
+        names += (names.empty() ? "" : ",") + name;
+    *info = rl_oiio_info{};
+    info->width = spec.width;
+    info->height = spec.height;
+    info->channels = spec.nchannels;
+    info->x = spec.x;
+    info->y = spec.y;
+    info->display[0] = spec.full_x;
+    info->display[1] = spec.full_y;
+    info->display[2] = spec.full_width;
+    info->display[3] = spec.full_height;
+    info->type = nearest_type(spec.format);
+    snprintf(info->names, sizeof info->names, "%s", names.c_str());
+    snprintf(info->colorspace, sizeof info->colorspace, "%s",
+             spec.get_string_attribute("oiio:ColorSpace").c_str());
+}
+
+static int open_image(const char *path, rl_oiio_file **out, rl_oiio_info *info, char *message, size_t size)
+{
+    *out = nullptr;
+    try {
+        std::unique_ptr<rl_oiio_file> file(new rl_oiio_file);
+        file->input = OIIO::ImageInput::open(path);
+        if (!file->input)
+            return failed(OIIO::geterror(), message, size);
+        fill_info(file->input->spec(), info);
+        *out = file.release();
+        return 0;
+    } catch (...) {
+        return caught(message, size);
+    }
+}
+
+static int read_image(rl_oiio_file *file, float *pixels, char *message, size_t size)
+{
+    try {
+        if (!file->input->read_image(0, 0, 0, file->input->spec().nchannels, OIIO::TypeFloat, pixels))
+            return failed(file->input->geterror(), message, size);
+        return 0;
+    } catch (...) {
+        return caught(message, size);
+    }
+}
+
+static const char *read_attribute(rl_oiio_file *file, const char *name)
+{
+    try {
+        file->text = file->input->spec().get_string_attribute(name).c_str();
+        return file->text.c_str();
+    } catch (...) {
+        return "";
+    }
+}
+
+static void close_image(rl_oiio_file *file)
+{
+    try {
+        delete file;
+    } catch (...) {
+    }
+}
+
+extern "C" EXPORT const rl_oiio_module *rl_oiio_module_get(void)
+{
+    static const rl_oiio_module module = {RL_OIIO_VERSION, write_image,    writable,   open_image,
+                                          read_image,      read_attribute, close_image};
+    return &module;
+}
