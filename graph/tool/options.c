@@ -330,14 +330,14 @@ rl_code rl_command_find(const rl_commands *commands, const char *name, size_t *o
 
 /* ---- help ---------------------------------------------------------------------------------------------- */
 
-enum { HELP_COLUMN = 26 };
+enum { COMMAND_COLUMN = 20, OPTION_COLUMN = 26 };
 
 /* "  --frames SPEC           1-24, …", continued at the same column. */
-static void add_row(rl_str *s, const char *left, const char *help)
+static void add_row(rl_str *s, int column, const char *left, const char *help)
 {
-    rl_str_printf(s, "  %-*s", HELP_COLUMN - 2, left);
+    rl_str_printf(s, "  %-*s", column - 2, left);
     for (const char *at = help; at; at = strchr(at, '\n') ? strchr(at, '\n') + 1 : NULL)
-        rl_str_printf(s, "%*s%.*s\n", at == help ? 0 : HELP_COLUMN, "", (int)strcspn(at, "\n"), at);
+        rl_str_printf(s, "%*s%.*s\n", at == help ? 0 : column, "", (int)strcspn(at, "\n"), at);
 }
 
 void rl_help_overview(const rl_commands *commands, rl_str *out)
@@ -352,7 +352,7 @@ void rl_help_overview(const rl_commands *commands, rl_str *out)
         strncpy(left, rl_str_text(&line), sizeof left - 1);
         left[sizeof left - 1] = 0;
         rl_str_free(&line);
-        add_row(out, left, c->help);
+        add_row(out, COMMAND_COLUMN, left, c->help);
     }
     rl_str_add(out,
                "\n`relit COMMAND --help` lists a command's options. `relit --version` prints the version.\n\n"
@@ -381,6 +381,6 @@ void rl_help_command(const rl_command_info *command, rl_str *out)
             strcat(left, " ");
             strncat(left, o->argument, 28);
         }
-        add_row(out, left, o->help);
+        add_row(out, OPTION_COLUMN, left, o->help);
     }
 }
