@@ -354,13 +354,12 @@ void rl_help_overview(const rl_commands *commands, rl_str *out)
         rl_str_free(&line);
         add_row(out, COMMAND_COLUMN, left, c->help);
     }
-    rl_str_add(out,
-               "\n`relit COMMAND --help` lists a command's options. `relit --version` prints the version.\n\n"
-               "exit status:\n"
-               "  0  all done\n"
-               "  1  a frame failed; the others were written\n"
-               "  2  the command line, the pipeline or the capture is wrong; nothing was written\n"
-               "  stopped by SIGINT or SIGTERM: that signal, after the frames in flight are whole\n");
+    rl_str_add(out, "\n`relit COMMAND --help` lists a command's options, `relit --version` the version.\n\n"
+                    "exit status:\n"
+                    "  0  all done\n"
+                    "  1  a frame failed; the others were written\n"
+                    "  2  the command line, the pipeline or the capture is wrong; nothing was written\n"
+                    "  SIGINT and SIGTERM stop a run by that signal, after the frames in flight\n");
 }
 
 void rl_help_command(const rl_command_info *command, rl_str *out)
