@@ -16,7 +16,7 @@
 #ifndef RL_SHARED_H
 #define RL_SHARED_H
 
-#define RL_GUARD   64
+#define RL_GUARD   128
 #define RL_MARGIN4 16
 
 /* x right, y down in pixels; view space is right-handed, +x right, +y up, looks down -z; metres. The sample

@@ -4,7 +4,13 @@
 
 /* One line a pass, in the order in which `relit passes` lists them. X(NAME) stands for rl_pass_NAME of
  * passes/NAME.c. */
-#define RL_PASSES(X) X(lighting) X(sss_burley) X(sss_reference) X(combine) X(taa)
+#define RL_PASSES(X)                                                                                         \
+    X(lighting)                                                                                              \
+    X(sss_burley)                                                                                            \
+    X(sss_reference)                                                                                         \
+    X(combine)                                                                                               \
+    X(geometric_normal)                                                                                      \
+    X(taa)
 
 #define RL_DECLARE(name) extern const rl_pass rl_pass_##name;
 RL_PASSES(RL_DECLARE)

@@ -39,6 +39,7 @@ struct rl_device {
 struct rl_memory {
     rl_device *device;
     cl_mem mem;
+    cl_mem seen; /* what kernels get: mem, or the part of it behind the guard */
     size_t bytes;
     void *host;   /* host-memory devices: ours */
     void *mapped;
@@ -288,7 +289,23 @@ static rl_code fill_zero(rl_memory *m, rl_error *err)
     return rl_memory_unmap(m, err);
 }
 
-rl_code rl_memory_new(rl_device *device, size_t bytes, rl_memory **out, rl_error *err)
+static rl_code create_buffer(rl_memory *m, rl_error *err)
+{
+    const rl_device *d = m->device;
+    cl_int status = CL_OUT_OF_RESOURCES;
+    if (d->info.host_memory) {
+        m->host = rl_aligned(m->bytes);
+        if (!m->host)
+            return rl_fail_memory(err, m->bytes);
+        if (!injected())
+            m->mem = clCreateBuffer(d->context, CL_MEM_READ_WRITE | CL_MEM_USE_HOST_PTR, m->bytes, m->host, &status);
+    } else if (!injected()) {
+        m->mem = clCreateBuffer(d->context, CL_MEM_READ_WRITE | CL_MEM_ALLOC_HOST_PTR, m->bytes, NULL, &status);
+    }
+    return m->mem ? RL_OK : fail_cl(err, status, "a buffer cannot be made");
+}
+
+rl_code rl_memory_new(rl_device *device, size_t bytes, size_t guard, rl_memory **out, rl_error *err)
 {
     *out = NULL;
     rl_memory *m = rl_calloc(1, sizeof *m);
@@ -296,21 +313,15 @@ rl_code rl_memory_new(rl_device *device, size_t bytes, rl_memory **out, rl_error
         return rl_fail_memory(err, sizeof *m);
     m->device = device;
     m->bytes = bytes ? bytes : RL_ALIGN;
-    cl_int status = CL_OUT_OF_RESOURCES;
-    rl_code code = RL_OK;
-    if (device->info.host_memory) {
-        m->host = rl_aligned(m->bytes);
-        if (!m->host)
-            code = rl_fail_memory(err, m->bytes);
-        else if (!injected())
-            m->mem = clCreateBuffer(device->context, CL_MEM_READ_WRITE | CL_MEM_USE_HOST_PTR, m->bytes,
-                                    m->host, &status);
-    } else if (!injected()) {
-        m->mem = clCreateBuffer(device->context, CL_MEM_READ_WRITE | CL_MEM_ALLOC_HOST_PTR, m->bytes, NULL,
-                                &status);
+    rl_code code = create_buffer(m, err);
+    if (!code && guard) {
+        cl_int status = CL_OUT_OF_RESOURCES;
+        cl_buffer_region behind = {guard, m->bytes - guard};
+        if (!injected())
+            m->seen = clCreateSubBuffer(m->mem, 0, CL_BUFFER_CREATE_TYPE_REGION, &behind, &status);
+        if (!m->seen)
+            code = fail_cl(err, status, "a part of a buffer cannot be made");
     }
-    if (!code && !m->mem)
-        code = fail_cl(err, status, "a buffer cannot be made");
     if (!code)
         code = fill_zero(m, err);
     if (code)
@@ -325,6 +336,8 @@ void rl_memory_free(rl_memory **memory)
     *memory = NULL;
     if (!m)
         return;
+    if (m->seen)
+        clReleaseMemObject(m->seen);
     if (m->mem)
         clReleaseMemObject(m->mem);
     rl_free(m->host);
@@ -546,7 +559,8 @@ static cl_int set_arguments(cl_kernel kernel, const rl_dispatch *x)
     if (status == CL_SUCCESS && wanted != x->n_arguments)
         return CL_INVALID_ARG_INDEX;
     for (size_t i = 0; status == CL_SUCCESS && i < x->n_arguments; i++) {
-        cl_mem mem = x->arguments[i] ? x->arguments[i]->mem : NULL;
+        const rl_memory *m = x->arguments[i];
+        cl_mem mem = m ? m->seen ? m->seen : m->mem : NULL;
         status = CL(clSetKernelArg(kernel, (cl_uint)i, sizeof mem, mem ? &mem : NULL));
     }
     return status;

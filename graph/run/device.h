@@ -40,9 +40,10 @@ rl_code rl_device_open(const char *choice, int threads, const rl_log *log, rl_de
 void rl_device_close(rl_device **device);
 const rl_device_info *rl_device_about(const rl_device *device);
 
-/* A buffer, zeroed. On a host-memory device it is RL_ALIGN-aligned memory from rl_aligned, else device
+/* A buffer, zeroed. Kernels get a pointer behind its first `guard` bytes (a multiple of 512, so that every device takes
+ * the offset), the host's view starts at the first. On a host-memory device it is RL_ALIGN-aligned memory from rl_aligned, else device
  * memory. */
-rl_code rl_memory_new(rl_device *device, size_t bytes, rl_memory **out, rl_error *err);
+rl_code rl_memory_new(rl_device *device, size_t bytes, size_t guard, rl_memory **out, rl_error *err);
 void rl_memory_free(rl_memory **memory);
 size_t rl_memory_bytes(const rl_memory *memory);
 /* The host's view. Between map and unmap no kernel may use it. Map and unmap may be called from another

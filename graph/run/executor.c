@@ -6,6 +6,9 @@
 #include "graph/base/pool.h"
 #include "graph/run/kernel_source.h"
 
+/* Kernels address images from pixel (0, 0) on; the guard in front can be read. */
+#define GUARD_BYTES (RL_GUARD * sizeof(float))
+
 /* What a live node needs besides images. */
 typedef struct node_state {
     rl_program *program;
@@ -41,7 +44,7 @@ static rl_code upload(rl_executor *x, const void *data, size_t bytes, rl_memory 
 {
     if (!*out || rl_memory_bytes(*out) < bytes) {
         rl_memory_free(out);
-        rl_code code = rl_memory_new(x->device, bytes, out, err);
+        rl_code code = rl_memory_new(x->device, bytes, 0, out, err);
         if (code)
             return code;
     }
@@ -144,7 +147,7 @@ rl_code rl_executor_new(rl_device *device, const rl_plan *plan, const rl_materia
     if (!code)
         code = upload(x, materials->data, materials->count * materials->entry_bytes, &x->materials, err);
     if (!code)
-        code = rl_memory_new(device, sizeof(frame_t), &x->frame, err);
+        code = rl_memory_new(device, sizeof(frame_t), 0, &x->frame, err);
     if (code)
         rl_executor_free(&x);
     *out = x;
@@ -191,11 +194,13 @@ rl_code rl_executor_resize(rl_executor *x, const rl_geometry *geometry, rl_error
     free_images(x);
     rl_code code = RL_OK;
     for (size_t i = 0; i < x->plan->n_slots && !code; i++)
-        code = rl_memory_new(x->device, rl_slot_bytes(x->plan, (int)i, geometry), &x->slots[i], err);
+        code = rl_memory_new(x->device, rl_slot_bytes(x->plan, (int)i, geometry), GUARD_BYTES, &x->slots[i],
+                             err);
     for (size_t i = 0; i < x->plan->n_buffers && !code; i++) {
         const rl_buffer *b = &x->plan->buffers[i];
         for (size_t half = 0; half < 2 && b->kind == RL_BUFFER_HISTORY && !code; half++)
-            code = rl_memory_new(x->device, rl_buffer_bytes(b, geometry), &x->history[2 * i + half], err);
+            code = rl_memory_new(x->device, rl_buffer_bytes(b, geometry), GUARD_BYTES, &x->history[2 * i + half],
+                                 err);
     }
     if (code)
         free_images(x);
@@ -209,7 +214,8 @@ const rl_geometry *rl_executor_geometry(const rl_executor *x)
     return &x->geometry;
 }
 
-rl_code rl_frame_buffers_new(rl_executor *x, const rl_geometry *geometry, rl_frame_buffers **out, rl_error *err)
+rl_code rl_frame_buffers_new(rl_executor *x, const rl_geometry *geometry, rl_frame_buffers **out,
+                             rl_error *err)
 {
     rl_frame_buffers *f = rl_calloc(1, sizeof *f);
     *out = f;
@@ -221,7 +227,7 @@ rl_code rl_frame_buffers_new(rl_executor *x, const rl_geometry *geometry, rl_fra
     for (size_t i = 0; i < f->n && !code; i++) {
         const rl_buffer *b = &x->plan->buffers[i];
         if (b->kind == RL_BUFFER_SOURCE || b->kind == RL_BUFFER_SINK)
-            code = rl_memory_new(x->device, rl_buffer_bytes(b, geometry), &f->memory[i], err);
+            code = rl_memory_new(x->device, rl_buffer_bytes(b, geometry), GUARD_BYTES, &f->memory[i], err);
     }
     if (code)
         rl_frame_buffers_free(out);
@@ -271,22 +277,13 @@ static void domain_sizes(rl_domain domain, const rl_geometry *g, rl_dispatch *d)
     size_t columns = (size_t)g->columns, rows = (size_t)g->rows;
     switch (domain) {
     case RL_EVERY_PIXEL:
-        *d = (rl_dispatch){
-            .dims = 2, .global = {columns, rows},
-                 .local = {64,      1   }
-        };
+        *d = (rl_dispatch){.dims = 2, .global = {columns, rows}, .local = {64, 1}};
         break;
     case RL_EVERY_VECTOR:
-        *d = (rl_dispatch){
-            .dims = 2, .global = {columns / 16, rows},
-                 .local = {4,            4   }
-        };
+        *d = (rl_dispatch){.dims = 2, .global = {columns / 16, rows}, .local = {4, 1}};
         break;
     case RL_EVERY_PHASE:
-        *d = (rl_dispatch){
-            .dims = 3, .global = {16, columns / 64, rows / 4},
-                 .local = {16, 1,            1       }
-        };
+        *d = (rl_dispatch){.dims = 3, .global = {16, columns / 64, rows / 4}, .local = {16, 1, 1}};
         break;
     }
 }
@@ -334,8 +331,7 @@ static rl_code run_convert(rl_executor *x, const rl_plan_step *s, const rl_frame
         .n_arguments = 3,
         .dims = 3,
         .global = {(size_t)x->geometry.columns / 64 + 2, (size_t)x->geometry.rows, (size_t)from->planes},
-        .local = {1,                                    4,                        1                   }
-    };
+        .local = {1, 4, 1}};
     return rl_device_run(x->device, x->convert, &d, span, err);
 }
 
@@ -357,22 +353,20 @@ static rl_code upload_frame(rl_executor *x, const rl_frame_values *v, rl_error *
 {
     const rl_geometry *g = &x->geometry;
     int left = g->x - g->origin_x, top = g->y - g->origin_y;
-    frame_t f = {
-        .columns = g->columns,
-        .rows = g->rows,
-        .valid = {left,             top, left + g->width, top + g->height},
-        .origin = {g->origin_x, g->origin_y   },
-        .stride = g->stride,
-        .plane = g->plane,
-        .stride4 = g->stride4,
-        .plane4 = g->plane4,
-        .number = v->number,
-        .history = x->has_history,
-        .materials = (int)x->material_table->count,
-        .lights = v->n_lights,
-        .camera = v->camera,
-        .previous = x->has_history ? x->previous : v->camera
-    };
+    frame_t f = {.columns = g->columns,
+                 .rows = g->rows,
+                 .valid = {left, top, left + g->width, top + g->height},
+                 .origin = {g->origin_x, g->origin_y},
+                 .stride = g->stride,
+                 .plane = g->plane,
+                 .stride4 = g->stride4,
+                 .plane4 = g->plane4,
+                 .number = v->number,
+                 .history = x->has_history,
+                 .materials = (int)x->material_table->count,
+                 .lights = v->n_lights,
+                 .camera = v->camera,
+                 .previous = x->has_history ? x->previous : v->camera};
     rl_code code = upload(x, &f, sizeof f, &x->frame, err);
     if (!code)
         code = upload(x, v->lights, (size_t)v->n_lights * sizeof *v->lights, &x->lights, err);
