@@ -171,8 +171,9 @@ static rl_code check_required(rl_manifest_reader *r)
     return RL_OK;
 }
 
-rl_code rl_manifest_parse(rl_arena *arena, const rl_value *v, const char *presets, const rl_log *log,
-                          rl_manifest **out, rl_error *err)
+/* `whole`: every layer that is required must be there. */
+static rl_code parse(rl_arena *arena, const rl_value *v, const char *presets, bool whole, const rl_log *log,
+                     rl_manifest **out, rl_error *err)
 {
     *out = NULL;
     rl_manifest *m = rl_arena_alloc(arena, sizeof *m);
@@ -193,11 +194,17 @@ rl_code rl_manifest_parse(rl_arena *arena, const rl_value *v, const char *preset
     }
     if (!code)
         code = read_all(&r, v);
-    if (!code)
+    if (!code && whole)
         code = check_required(&r);
     if (!code)
         *out = m;
     return code;
+}
+
+rl_code rl_manifest_parse(rl_arena *arena, const rl_value *v, const char *presets, const rl_log *log,
+                          rl_manifest **out, rl_error *err)
+{
+    return parse(arena, v, presets, true, log, out, err);
 }
 
 rl_code rl_manifest_load(rl_arena *arena, const char *path, const char *presets, const rl_log *log,
@@ -216,8 +223,8 @@ rl_code rl_manifest_bare(rl_arena *arena, const char *files, const char *preset,
                          const rl_log *log, rl_manifest **out, rl_error *err)
 {
     *out = NULL;
-    rl_value *map = rl_arena_alloc(arena, sizeof *map), *texts = rl_arena_array(arena, 3, sizeof *texts);
-    rl_entry *entries = rl_arena_array(arena, 3, sizeof *entries);
+    rl_value *map = rl_arena_alloc(arena, sizeof *map), *texts = rl_arena_array(arena, 4, sizeof *texts);
+    rl_entry *entries = rl_arena_array(arena, 4, sizeof *entries);
     if (!map || !texts || !entries)
         return rl_fail_memory(err, sizeof *map);
     const char *name = rl_path_name(files);
@@ -229,14 +236,20 @@ rl_code rl_manifest_bare(rl_arena *arena, const char *files, const char *preset,
     if (!where.file || !number)
         return rl_fail_memory(err, strlen(files));
     bool numbered = strchr(name, '#') || strchr(name, '%');
-    const char *keys[] = {"files", "preset", "frames"}, *values[] = {where.file, preset, number};
-    *map =
-        (rl_value){.kind = RL_MAP, .where = where, .n = !numbered && number[0] ? 3 : 2, .entries = entries};
-    for (size_t i = 0; i < map->n; i++) {
+    const char *keys[] = {"files", "preset", "frames"};
+    const char *values[] = {where.file, preset, !numbered && number[0] ? number : NULL};
+    *map = (rl_value){.kind = RL_MAP, .where = where, .entries = entries};
+    for (size_t i = 0; i < RL_ARRAY_LENGTH(keys); i++) {
+        if (!values[i])
+            continue;
         texts[i] = (rl_value){.kind = RL_TEXT, .where = where, .text = values[i]};
-        entries[i] = (rl_entry){.key = keys[i], .where = where, .value = &texts[i]};
+        entries[map->n++] = (rl_entry){.key = keys[i], .where = where, .value = &texts[i]};
     }
-    return rl_manifest_parse(arena, map, presets, log, out, err);
+    if (!preset) {
+        texts[3] = (rl_value){.kind = RL_MAP, .where = where};
+        entries[map->n++] = (rl_entry){.key = "layers", .where = where, .value = &texts[3]};
+    }
+    return parse(arena, map, presets, preset != NULL, log, out, err);
 }
 
 const rl_layer *rl_manifest_layer(const rl_manifest *m, const char *name)

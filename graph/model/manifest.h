@@ -154,7 +154,7 @@ rl_code rl_manifest_load(rl_arena *arena, const char *path, const char *presets,
                          rl_manifest **out, rl_error *err);
 
 /* For a bare EXR file or pattern without manifest, by the rules of a preset. A single file keeps the frame
- * number of its name. */
+ * number of its name. Without a preset (NULL) the manifest has files and frames, but no layers. */
 rl_code rl_manifest_bare(rl_arena *arena, const char *files, const char *preset, const char *presets,
                          const rl_log *log, rl_manifest **out, rl_error *err);
 

@@ -51,8 +51,9 @@ static rl_code make_output(rl_session *s, const rl_output *spec, rl_sink_output 
         if (!code)
             code = rl_color_primaries(s->ocio, target, spec->color_where, &out->primaries, err);
     }
-    bool converts = spec->display || spec->look || exposed || (spec->colorspace && strcmp(target, s->working));
-    if (!code && converts)
+    bool converts =
+        !code && (spec->display || spec->look || exposed || (spec->colorspace && strcmp(target, s->working)));
+    if (converts)
         code = rl_color_pass_new(s->ocio, &request, exposed, spec->color_where, &s->arena, s->log, &pass, err);
     if (code)
         return code;

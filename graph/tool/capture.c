@@ -139,7 +139,7 @@ rl_code rl_capture_ids(rl_arena *arena, const rl_manifest *m, size_t most, uint3
     if (!code)
         qsort(ids, pixels, sizeof *ids, by_id);
     for (size_t i = 0; !code && i < pixels && *n < most; i++)
-        if (!i || ids[i] != ids[i - 1])
+        if (ids[i] && (!i || ids[i] != ids[i - 1]))
             out[(*n)++] = ids[i];
     rl_free(ids);
     rl_exr_close(&file);

@@ -20,7 +20,8 @@ rl_code rl_capture_find(rl_arena *arena, const char *path, const rl_log *log, rl
 /* The file of a pattern of the manifest at its first frame; NULL when memory is out. */
 char *rl_capture_first(rl_arena *arena, const rl_manifest *m, int pattern);
 
-/* The stencil ids of the first frame, ascending, each once, at most `most`. None when it has no stencil. */
+/* The stencil ids of the first frame, ascending, each once, at most `most`; 0 is left out, since it marks the
+ * background as a rule. None when there is no stencil. */
 rl_code rl_capture_ids(rl_arena *arena, const rl_manifest *m, size_t most, uint32_t *out, size_t *n,
                        rl_error *err);
 

@@ -9,12 +9,13 @@ typedef struct command {
 
 static const command commands[] = {
     {{"run", RL_CMD_RUN, "PIPELINE", "process frames",
-      "Reads the frames of the pipeline's capture, runs its graph and writes its outputs.\n"
-      "A file under its final name is whole. A frame that fails does not stop the others.\n"},
+      "Reads the frames of the pipeline's capture, runs its graph and writes its\n"
+      "outputs. A file under its final name is whole. A frame that fails does not stop\n"
+      "the others.\n"},
      rl_cmd_run},
     {{"check", RL_CMD_CHECK, "PIPELINE", "validate everything without processing a pixel",
-      "Reads the pipeline, opens the headers of the capture, makes the plan and compiles the\n"
-      "kernels. Writes nothing.\n"},
+      "Reads the pipeline, opens the headers of the capture, makes the plan and\n"
+      "compiles the kernels. Writes nothing.\n"},
      rl_cmd_check},
     {{"plan", RL_CMD_PLAN, "PIPELINE", "show the graph: order, lifetimes, memory, culled passes", NULL},
      rl_cmd_plan},

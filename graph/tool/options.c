@@ -330,14 +330,14 @@ rl_code rl_command_find(const rl_commands *commands, const char *name, size_t *o
 
 /* ---- help ---------------------------------------------------------------------------------------------- */
 
-enum { HELP_COLUMN = 26 };
+enum { COMMAND_COLUMN = 20, OPTION_COLUMN = 26 };
 
 /* "  --frames SPEC           1-24, …", continued at the same column. */
-static void add_row(rl_str *s, const char *left, const char *help)
+static void add_row(rl_str *s, int column, const char *left, const char *help)
 {
-    rl_str_printf(s, "  %-*s", HELP_COLUMN - 2, left);
+    rl_str_printf(s, "  %-*s", column - 2, left);
     for (const char *at = help; at; at = strchr(at, '\n') ? strchr(at, '\n') + 1 : NULL)
-        rl_str_printf(s, "%*s%.*s\n", at == help ? 0 : HELP_COLUMN, "", (int)strcspn(at, "\n"), at);
+        rl_str_printf(s, "%*s%.*s\n", at == help ? 0 : column, "", (int)strcspn(at, "\n"), at);
 }
 
 void rl_help_overview(const rl_commands *commands, rl_str *out)
@@ -352,15 +352,14 @@ void rl_help_overview(const rl_commands *commands, rl_str *out)
         strncpy(left, rl_str_text(&line), sizeof left - 1);
         left[sizeof left - 1] = 0;
         rl_str_free(&line);
-        add_row(out, left, c->help);
+        add_row(out, COMMAND_COLUMN, left, c->help);
     }
-    rl_str_add(out,
-               "\n`relit COMMAND --help` lists a command's options. `relit --version` prints the version.\n\n"
-               "exit status:\n"
-               "  0  all done\n"
-               "  1  a frame failed; the others were written\n"
-               "  2  the command line, the pipeline or the capture is wrong; nothing was written\n"
-               "  stopped by SIGINT or SIGTERM: that signal, after the frames in flight are whole\n");
+    rl_str_add(out, "\n`relit COMMAND --help` lists a command's options, `relit --version` the version.\n\n"
+                    "exit status:\n"
+                    "  0  all done\n"
+                    "  1  a frame failed; the others were written\n"
+                    "  2  the command line, the pipeline or the capture is wrong; nothing was written\n"
+                    "  SIGINT and SIGTERM stop a run by that signal, after the frames in flight\n");
 }
 
 void rl_help_command(const rl_command_info *command, rl_str *out)
@@ -381,6 +380,6 @@ void rl_help_command(const rl_command_info *command, rl_str *out)
             strcat(left, " ");
             strncat(left, o->argument, 28);
         }
-        add_row(out, left, o->help);
+        add_row(out, OPTION_COLUMN, left, o->help);
     }
 }
