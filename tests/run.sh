@@ -9,8 +9,8 @@ for program in "$@"; do
     log=$(CMOCKA_MESSAGE_OUTPUT=TAP timeout "${RELIT_TEST_TIMEOUT:-300}" "$program" 2>&1)
     status=$?
     good=$(grep -c '^ok ' <<<"$log")
-    bad=$(grep -c '^not ok ' <<<"$log")
-    if [ "$status" -ne 0 ] && [ "$bad" -eq 0 ] || [ "$good" -eq 0 ]; then
+    bad=$(grep -c '^not ok [0-9]' <<<"$log")
+    if { [ "$status" -ne 0 ] && [ "$bad" -eq 0 ]; } || [ $((good + bad)) -eq 0 ]; then
         bad=$((bad + 1))
         echo "$name: ended with status $status after $good tests"
     fi

@@ -232,12 +232,12 @@ static void test_bad(void **state)
         {"fps: 24fps\nfiles: a.exr\n",
          "1:6: error: 'fps': expected frames a second, such as 24 or 24000/1001, found the text '24fps'"                                               },
         {"fps: 0\n",                                                 "1:6: error: 'fps' is 0: out of range, above 0 and at most 1e6"                   },
-        {"unit: inch\n",                                             "1:7: error: 'unit': there is no word 'inch'; known: cm, m, mm"                   },
+        {"unit: inch\n",                                             "1:7: error: 'unit' cannot be 'inch'; known: cm, m, mm"                   },
         {"unit: -1\n",                                               "1:7: error: 'unit' is -1: out of range, above 0"                                 },
         {"camera: {forwards: -z}\n",
          "1:10: error: camera has no key 'forwards'; did you mean 'forward'? known: "
          "forward, fov_x, jitter, matrix"                                                                                                              },
-        {"camera: {forward: z}\n",                                   "1:19: error: 'forward': there is no word 'z'; did you mean '-z'? known: "
+        {"camera: {forward: z}\n",                                   "1:19: error: 'forward' cannot be 'z'; did you mean '-z'? known: "
                                    "+z, -z"                                                                          },
         {"camera: {fov_x: 180}\n",                                   "1:17: error: 'fov_x' is 180: out of range, 0.001 to 179.9"                       },
         {"camera: {fov_x: wide}\n",
@@ -302,7 +302,7 @@ static void test_bad_layers(void **state)
         {"thickness: {channels: T, remap: [5, 1]}",                  "'remap' must be [min, max] with 0 <= min < max"                       },
         {"emission: [a, b]",                                         "layer 'emission': expected a list of 3 channel names"                 },
         {"emission: [a, [b], c]",                                    "'channels': expected the name of a channel, found a list of 1"        },
-        {"back_depth: {channels: D, kind: z}",                       "'kind': there is no word 'z'; known: device, planar, radial"          },
+        {"back_depth: {channels: D, kind: z}",                       "'kind' cannot be 'z'; known: device, planar, radial"          },
         {"back_depth: {channels: D, kind: device, near: 1}",
          "layer 'back_depth': device depth needs 'near' and 'far'"                                                                          },
         {"back_depth: {channels: D, kind: device, near: 2, far: 2}",
@@ -312,11 +312,11 @@ static void test_bad_layers(void **state)
          "layer 'back_depth': 'near' belongs to `kind: device`"                                                                             },
         {"back_depth: {channels: D, empty: .nan}",                   "'empty' is .nan: a number is needed"                                  },
         {"back_normal: {channels: [a, b, c], space: view}",
-         "'space': there is no word 'view'; known: camera, world"                                                                           },
+         "'space' cannot be 'view'; known: camera, world"                                                                           },
         {"back_normal: {channels: [a, b, c], encoding: octahedral}",
          "layer 'back_normal': expected a list of 2 channel names"                                                                          },
         {"motion: {channels: [a, b], unit: metres}",
-         "'unit': there is no word 'metres'; known: ndc, pixels, uv"                                                                        },
+         "'unit' cannot be 'metres'; known: ndc, pixels, uv"                                                                        },
         {"shadow: shadow.key",                                       "'shadow': expected a map, light: channel, found the text 'shadow.key'"},
         {"shadow: {key: [a, b]}",                                    "layer 'shadow.key': expected a list of 1 channel name"                },
         {"roughness: {channels: R, unit: m}",                        "layer 'roughness' has no key 'unit'; known: channels, part"           },
@@ -540,7 +540,7 @@ static void test_bad_lights(void **state)
     (void)state;
     static const char *const rows[][2] = {
         {"{position: [0, 0, 0]}",                                                             "light 'k' needs 'type': point, spot or directional"                },
-        {"{type: sphere}",                                                                    "'type': there is no word 'sphere'; known: directional, point, spot"},
+        {"{type: sphere}",                                                                    "'type' cannot be 'sphere'; known: directional, point, spot"},
         {"{type: point, intensity: 1}",                                                       "light 'k': a point light needs 'position'"                         },
         {"{type: point, position: [0, 0, 0]}",                                                "light 'k' needs intensity, candela or lumen"                       },
         {"{type: point, position: [0, 0, 0], lux: 3}",

@@ -105,7 +105,7 @@ static void test_types(void **state)
     refuse_row("taps", "\"21\"",
                "t.yaml:1:1: error: 'taps': expected auto|most or an integer 1 … 4096, found the text '21'");
     refuse_row("shape", "sqare",
-               "t.yaml:1:1: error: 'shape': 'sqare' is not one of its words; did you mean 'square'? known: "
+               "t.yaml:1:1: error: 'shape' cannot be 'sqare'; did you mean 'square'? known: "
                "disk, square");
     refuse_row("wrap", "1", "t.yaml:1:1: error: 'wrap': expected true or false, found the number '1'");
     refuse_row("tint", "[1, 1]",

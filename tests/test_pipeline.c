@@ -264,7 +264,7 @@ static void test_wrong_outputs(void **state)
     refuse_output("image: a.b, file: a.png, type: half",
                   "t.yaml:2:46: error: output 'o': a .png file cannot hold half; it can hold: uint8, uint16");
     refuse_output("image: a.b, file: a.exr, type: hafl",
-                  "t.yaml:2:46: error: 'type': 'hafl' is not one of its words; did you mean 'half'? known: "
+                  "t.yaml:2:46: error: 'type' cannot be 'hafl'; did you mean 'half'? known: "
                   "float, half, "
                   "uint16, uint32, uint8");
     refuse_output("image: a.b, file: a.exr, colorspace: x, display: y",
@@ -276,7 +276,7 @@ static void test_wrong_outputs(void **state)
     refuse_output("image: a.b, file: a.exr, look: y",
                   "t.yaml:2:46: error: output 'o': 'look' is of a display; name it in 'display'");
     refuse_output("image: a.b, file: a.exr, compression: ZPI",
-                  "t.yaml:2:53: error: 'compression': 'zpi' is not one of its words; did you mean 'zip'? "
+                  "t.yaml:2:53: error: 'compression' cannot be 'zpi'; did you mean 'zip'? "
                   "known: b44, b44a, "
                   "dwaa, dwab, none, piz, pxr24, rle, zip, zips");
     refuse_output("image: a.b, file: a.png, compression: zip",
@@ -484,7 +484,7 @@ static void test_wrong_kernels(void **state)
                   "'2e' cannot be the name of a kernel function: it has to be a C identifier (letters, "
                   "digits and '_')");
     refuse_kernel("file: vignette.cl, entry: e, items: row, " PORTS, 59,
-                  "'items': 'row' is not one of its words; known: phase, pixel, vector");
+                  "'items' cannot be 'row'; known: phase, pixel, vector");
     refuse_kernel("file: vignette.cl, entry: e, gian: 1, params: {gain: {type: float, value: 1}}, " PORTS, 52,
                   "pass 'vig' (kernel) has no parameter 'gian'; did you mean 'gain'? known: gain");
     refuse_kernel("file: vignette.cl, entry: e, in: {colour: a.b}, " PORTS, 57,
@@ -506,7 +506,7 @@ static void test_wrong_ports(void **state)
     refuse_port("a: {role: read}", KEY, "port 'a' needs 'type': rgb|normal|vec2|scalar|id");
     refuse_port(
         "a: {role: reed, type: rgb}", KEY + 10,
-        "'role': 'reed' is not one of its words; did you mean 'read'? known: history, read, scratch, write");
+        "'role' cannot be 'reed'; did you mean 'read'? known: history, read, scratch, write");
     refuse_port("a: {role: write, type: rgb, optional: true}", KEY + 38,
                 "port 'a': only a port that is read can be optional");
     refuse_port("a: {role: read, type: rgb, of: out}", KEY + 31,
@@ -551,7 +551,7 @@ static void test_wrong_params(void **state)
                  "parameter 'g': 'words' is for enum and int");
     refuse_param("g: {type: enum, value: a}", key, "parameter 'g' needs 'words': [one, another]");
     refuse_param("g: {type: enum, value: a, words: [b]}", key + 23,
-                 "'g': 'a' is not one of its words; known: b");
+                 "'g' cannot be 'a'; known: b");
     refuse_param("g: {type: enum, value: a, words: ['a|b']}", key + 34,
                  "'words': expected a word, found the text 'a|b'");
     refuse_param("entry: {type: float, value: 1}", key,

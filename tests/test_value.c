@@ -583,7 +583,7 @@ static void test_other_scalars(void **state)
     assert_int_equal(rl_value_word(parse("device"), "kind", "planar|radial|device", &w, &err), RL_OK);
     assert_int_equal(w, 2);
     rl_value_word(parse("radia"), "kind", "planar|radial|device", &w, &err);
-    assert_message("t.yaml:1:1: error: 'kind': there is no word 'radia'; did you mean 'radial'? known: "
+    assert_message("t.yaml:1:1: error: 'kind' cannot be 'radia'; did you mean 'radial'? known: "
                    "device, planar, radial");
     rl_value_word(parse("[a]"), "kind", "planar|radial", &w, &err);
     assert_message("t.yaml:1:1: error: 'kind': expected one of planar|radial, found a list of 1");

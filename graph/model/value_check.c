@@ -149,7 +149,7 @@ static rl_code unknown_word(const rl_value *v, const char *name, const char *wor
     for (char *w = strtok_r(copy, "|", &rest); w && n < MOST; w = strtok_r(NULL, "|", &rest))
         known[n++] = w;
     rl_str head = {0};
-    rl_str_printf(&head, "'%s': there is no word", name);
+    rl_str_printf(&head, "'%s' cannot be", name);
     rl_code code = head.failed ? rl_fail_memory(err, head.room)
                                : rl_fail_unknown(err, v->where, rl_str_text(&head), v->text, known, n);
     rl_str_free(&head);
