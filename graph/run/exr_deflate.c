@@ -83,6 +83,7 @@ static size_t compress_zip(rl_exr_deflater *de, size_t size)
         return libdeflate_zlib_compress(de->deflate, de->coded, size, de->packed, size - 1);
     struct isal_zstream *s = de->stream;
     isal_deflate_stateless_init(s);
+    s->hist_bits = 0; /* init forgets it, and what memory happens to hold would change the output */
     s->gzip_flag = IGZIP_ZLIB;
     s->level = 1;
     s->level_buf = de->level_buffer;
