@@ -134,8 +134,8 @@ static inline void through(constant material_t *m, const surface_t *s, const ray
     const float log2_e = 1.44269504f;
     int mode = m->profile_transmission;
     floatv along = r->shadow_thickness * back; /* from the light's ray to the normal */
-    floatv measured = rl_select(along, s->thickness, s->thickness > 0.0f);
-    floatv t = measured, visibility = 1.0f;
+    floatv known = rl_select(along, s->thickness, s->thickness > 0.0f);
+    floatv t = known, visibility = 1.0f;
     if (mode == THIN) {
         visibility = r->visibility; /* of both faces; but the object itself is no shadow on its back */
         if (r->has_thickness)
@@ -173,16 +173,12 @@ static inline void sum_lights(constant material_t *m, const surface_t *s, consta
         r.visibility = 1.0f;
         r.shadow_thickness = 0.0f;
         r.has_thickness = 0;
-#if HAS_shadow
-        if (light->shadow >= 0)
+        if (HAS_shadow && light->shadow >= 0)
             r.visibility = rl_load(shadow, light->shadow * f->plane + at);
-#endif
-#if HAS_shadow_thickness
-        if (transmits && light->shadow_thickness >= 0) {
+        if (HAS_shadow_thickness && transmits && light->shadow_thickness >= 0) {
             r.shadow_thickness = rl_load(shadow_thickness, light->shadow_thickness * f->plane + at);
             r.has_thickness = 1;
         }
-#endif
         floatv entered = r.falloff * transmit(m->shading_diffuse, r.nl);
         floatv lit = r.falloff * r.visibility * fmax(r.nl, 0.0f);
         floatv front = entered * r.visibility * fmax(r.nl, 0.0f);
@@ -202,6 +198,14 @@ static inline void sum_lights(constant material_t *m, const surface_t *s, consta
             }
         }
     }
+}
+
+/* What a material gives wins over the layer of that name, which wins over the default. */
+static inline floatv given(float own, int has_layer, global const float *layer, int at, float otherwise)
+{
+    if (own >= 0.0f)
+        return own;
+    return has_layer ? rl_load(layer, at) : (floatv)otherwise;
 }
 
 /* One material for a whole vector: what enters (`diffuse`) and what is complete (`lit`). */
@@ -244,41 +248,24 @@ kernel void lighting(global const float *albedo, global const float *normal, glo
             s.n[c] = rl_load(normal, at + c * f->plane);
         }
         view_surface(&s, f, x, y);
-        s.thickness = 0.0f;
-#if HAS_thickness
-        s.thickness = rl_load(thickness, at);
-#endif
+        s.thickness = HAS_thickness ? rl_load(thickness, at) : (floatv)0.0f;
     }
     while (now) {
         constant material_t *m = &materials[now];
         intv mask = id == now;
         floatv d[3], l[3];
-        s.roughness = m->material_roughness >= 0.0f ? m->material_roughness : 0.5f;
-        s.specular = m->material_specular >= 0.0f ? m->material_specular : 0.04f;
-        s.metallic = fmax(m->material_metallic, 0.0f);
-#if HAS_roughness
-        if (m->material_roughness < 0.0f)
-            s.roughness = rl_load(roughness, at);
-#endif
-#if HAS_specular
-        if (m->material_specular < 0.0f)
-            s.specular = rl_load(specular, at);
-#endif
-#if HAS_metallic
-        if (m->material_metallic < 0.0f)
-            s.metallic = rl_load(metallic, at);
-#endif
+        s.roughness = given(m->material_roughness, HAS_roughness, roughness, at, 0.5f);
+        s.specular = given(m->material_specular, HAS_specular, specular, at, 0.04f);
+        s.metallic = given(m->material_metallic, HAS_metallic, metallic, at, 0.0f);
         shade(m, &s, f, lights, shadow, shadow_thickness, at, d, l);
         for (int c = 0; c < 3; c++) {
             out_diffuse[c] = rl_select(out_diffuse[c], d[c], mask);
+            if (HAS_emission)
+                l[c] += rl_load(emission, at + c * f->plane);
             out_lit[c] = rl_select(out_lit[c], l[c], mask);
         }
         id = select(id, (uintv)0, mask);
         now = rl_max_id(id);
-#if HAS_emission
-        for (int c = 0; c < 3; c++)
-            out_lit[c] += rl_select(0.0f, rl_load(emission, at + c * f->plane), mask);
-#endif
     }
     for (int c = 0; c < 3; c++) {
         RL_STORE(diffuse, c, x, y, out_diffuse[c]);

@@ -9,207 +9,12 @@
 #include "graph/base/file.h"
 #include "graph/base/text.h"
 #include "tests/cl_shade.h"
+#include "tests/cl_shade_parts.h"
 
 static const char options[] = "-cl-std=CL1.2 -cl-mad-enable -cl-no-signed-zeros -cl-finite-math-only";
 static cl_context context;
 static cl_command_queue queue;
 static cl_device_id device;
-
-/* ---- images ----------------------------------------------------------------------------------------------
- */
-
-static int floor_to(int x, int step)
-{
-    return x - ((x % step) + step) % step;
-}
-
-frame_t shade_frame(int w, int h, int x0, int y0)
-{
-    frame_t f;
-    memset(&f, 0, sizeof f);
-    f.origin[0] = floor_to(x0, 64);
-    f.origin[1] = floor_to(y0, 4);
-    f.valid[0] = x0 - f.origin[0];
-    f.valid[1] = y0 - f.origin[1];
-    f.valid[2] = f.valid[0] + w;
-    f.valid[3] = f.valid[1] + h;
-    f.columns = (f.valid[2] + 63) / 64 * 64;
-    f.rows = (f.valid[3] + 3) / 4 * 4;
-    f.stride = f.columns;
-    f.plane = f.stride * f.rows;
-    f.stride4 = f.columns / 4 + 2 * RL_MARGIN4;
-    f.plane4 = 4 * f.rows * f.stride4;
-    return f;
-}
-
-/* Room for either layout, and the guards. */
-static size_t plane_room(const frame_t *f)
-{
-    return (size_t)(f->plane4 > f->plane ? f->plane4 : f->plane);
-}
-
-static size_t image_floats(const frame_t *f, int planes)
-{
-    return (size_t)planes * plane_room(f) + 2 * RL_GUARD;
-}
-
-shade_image shade_image_new(const frame_t *f, int planes)
-{
-    shade_image image = {planes, NULL};
-    size_t bytes = image_floats(f, planes) * sizeof(float);
-    float *base = rl_aligned(bytes);
-    if (base) {
-        memset(base, 0, bytes);
-        image.data = base + RL_GUARD;
-    }
-    return image;
-}
-
-void shade_image_free(shade_image *image)
-{
-    if (image->data)
-        rl_free(image->data - RL_GUARD);
-    image->data = NULL;
-}
-
-float *shade_at(const shade_image *image, const frame_t *f, int plane, int x, int y)
-{
-    return image->data + (ptrdiff_t)plane * f->plane + (ptrdiff_t)y * f->stride + x;
-}
-
-uint32_t shade_id(const shade_image *image, const frame_t *f, int x, int y)
-{
-    uint32_t id;
-    memcpy(&id, shade_at(image, f, 0, x, y), sizeof id);
-    return id;
-}
-
-void shade_set_id(const shade_image *image, const frame_t *f, int x, int y, uint32_t id)
-{
-    memcpy(shade_at(image, f, 0, x, y), &id, sizeof id);
-}
-
-/* ---- materials -------------------------------------------------------------------------------------------
- */
-
-static const char *const groups[] = {"profile", "material", "shading"};
-
-static const rl_params *group_rows(const rl_pass *pass, size_t group)
-{
-    const rl_params *const rows[] = {&pass->profile_keys, &pass->material_keys, &pass->shading_keys};
-    return rows[group];
-}
-
-typedef bool row_visit(void *ctx, const char *group, const rl_param *row, size_t word);
-
-/* Visits each distinct row once, in the order of the device's struct, until a visit returns true. */
-static bool each_row(const shade_materials *m, row_visit *visit, void *ctx)
-{
-    const rl_param *seen[SHADE_WORDS];
-    size_t word = 1;
-    for (size_t g = 0; g < 3; g++) {
-        size_t n_seen = 0;
-        for (size_t p = 0; p < m->n_passes; p++) {
-            const rl_params *rows = group_rows(m->passes[p], g);
-            for (size_t r = 0; r < rows->n; r++) {
-                bool again = false;
-                for (size_t i = 0; i < n_seen; i++)
-                    again |= strcmp(seen[i]->name, rows->rows[r].name) == 0;
-                if (again)
-                    continue;
-                seen[n_seen++] = &rows->rows[r];
-                if (visit(ctx, groups[g], &rows->rows[r], word))
-                    return true;
-                word += RL_PARAM_BYTES(rows->rows[r].type) / 4;
-            }
-        }
-    }
-    return false;
-}
-
-static uint32_t to_word(rl_type type, double value)
-{
-    uint32_t word;
-    float real = (float)value;
-    int32_t whole = (int32_t)value;
-    if (type == RL_F32 || type == RL_RGBF)
-        memcpy(&word, &real, 4);
-    else
-        memcpy(&word, &whole, 4);
-    return word;
-}
-
-static double from_word(rl_type type, uint32_t word)
-{
-    float real;
-    int32_t whole;
-    memcpy(&real, &word, 4);
-    memcpy(&whole, &word, 4);
-    return type == RL_F32 || type == RL_RGBF ? (double)real : (double)whole;
-}
-
-static bool default_row(void *ctx, const char *group, const rl_param *row, size_t word)
-{
-    uint32_t *words = ctx;
-    (void)group;
-    for (size_t i = 0; i < RL_PARAM_BYTES(row->type) / 4; i++)
-        words[word + i] = to_word(row->type, row->no_default ? -1 : row->def[i]);
-    return false;
-}
-
-size_t shade_material_add(shade_materials *m, bool has_profile)
-{
-    if (m->n == 0)
-        m->n = 1;
-    each_row(m, default_row, m->words[m->n]);
-    m->words[m->n][0] = has_profile;
-    return m->n++;
-}
-
-typedef struct row_search {
-    const char *group, *key;
-    rl_type type;
-    size_t word;
-} row_search;
-
-static bool is_row(void *ctx, const char *group, const rl_param *row, size_t word)
-{
-    row_search *s = ctx;
-    s->type = row->type;
-    s->word = word;
-    return strcmp(s->group, group) == 0 && strcmp(s->key, row->name) == 0;
-}
-
-bool shade_material_set(shade_materials *m, size_t entry, const char *group, const char *key, const double *v)
-{
-    row_search s = {.group = group, .key = key};
-    if (!each_row(m, is_row, &s))
-        return false;
-    for (size_t i = 0; i < RL_PARAM_BYTES(s.type) / 4; i++)
-        m->words[entry][s.word + i] = to_word(s.type, v[i]);
-    return true;
-}
-
-bool shade_material_get(const shade_materials *m, size_t entry, const char *group, const char *key, double *v)
-{
-    row_search s = {.group = group, .key = key};
-    if (!each_row(m, is_row, &s))
-        return false;
-    for (size_t i = 0; i < RL_PARAM_BYTES(s.type) / 4; i++)
-        v[i] = from_word(s.type, m->words[entry][s.word + i]);
-    return true;
-}
-
-void shade_params_default(const rl_pass *pass, void *params)
-{
-    for (size_t r = 0; r < pass->params.n; r++) {
-        const rl_param *row = &pass->params.rows[r];
-        for (size_t i = 0; i < RL_PARAM_BYTES(row->type) / 4; i++) {
-            uint32_t word = to_word(row->type, row->def[i]);
-            memcpy((char *)params + row->offset + 4 * i, &word, 4);
-        }
-    }
-}
 
 /* ---- the program's text ----------------------------------------------------------------------------------
  */
@@ -233,7 +38,7 @@ static void add_param(rl_str *s, const rl_param *row, const void *params)
     uint32_t word;
     memcpy(&word, (const char *)params + row->offset, 4);
     if (row->structural)
-        rl_str_printf(s, "#define P_%s %g\n", row->name, from_word(row->type, word));
+        rl_str_printf(s, "#define P_%s %g\n", row->name, shade_from_word(row->type, word));
 }
 
 static void add_prelude(rl_str *s, const shade_run *run)
@@ -248,7 +53,7 @@ static void add_prelude(rl_str *s, const shade_run *run)
     for (size_t r = 0; r < pass->params.n; r++)
         add_param(s, &pass->params.rows[r], run->params);
     rl_str_add(s, "typedef struct material_t { int has_profile; ");
-    each_row(run->materials, add_row, s);
+    shade_each_row(run->materials, add_row, s);
     rl_str_add(s, "} material_t;\n");
     for (size_t i = 0; i < pass->ports.n; i++) {
         const rl_port *port = &pass->ports.rows[i];
@@ -294,14 +99,16 @@ bool shade_device(void)
     return bad == CL_SUCCESS;
 }
 
-static cl_program build(const char *text)
+static cl_program build(const char *text, int lanes)
 {
     static char log[1 << 16];
+    char with[256];
     cl_int bad = 0;
+    snprintf(with, sizeof with, "%s -DRL_W=%d", options, lanes);
     cl_program program = clCreateProgramWithSource(context, 1, &text, NULL, &bad);
     if (bad)
         return NULL;
-    bad = clBuildProgram(program, 1, &device, options, NULL, NULL);
+    bad = clBuildProgram(program, 1, &device, with, NULL, NULL);
     log[0] = 0;
     clGetProgramBuildInfo(program, device, CL_PROGRAM_BUILD_LOG, sizeof log, log, NULL);
     if (bad || strstr(log, "warning:")) {
@@ -336,7 +143,7 @@ static bool add_port(launch *l, const frame_t *f, const shade_image *image)
 {
     if (!image)
         return add_buffer(l, NULL, 0);
-    size_t bytes = image_floats(f, image->planes) * sizeof(float);
+    size_t bytes = shade_image_floats(f, image->planes) * sizeof(float);
     cl_int bad = 0;
     cl_mem whole = clCreateBuffer(context, CL_MEM_READ_WRITE | CL_MEM_COPY_HOST_PTR, bytes,
                                   image->data - RL_GUARD, &bad);
@@ -360,14 +167,19 @@ static void free_launch(launch *l)
         clReleaseProgram(l->program);
 }
 
+static bool count_words(void *ctx, const char *group, const rl_param *row, size_t word)
+{
+    size_t *words = ctx;
+    (void)group;
+    *words = word + RL_PARAM_BYTES(row->type) / 4;
+    return false;
+}
+
 static bool add_materials(launch *l, const shade_materials *m)
 {
     static uint32_t packed[SHADE_MATERIALS * SHADE_WORDS];
     size_t words = 1;
-    row_search s = {.group = "", .key = ""};
-    each_row(m, is_row, &s); /* ends on the last row */
-    if (s.word)
-        words = s.word + RL_PARAM_BYTES(s.type) / 4;
+    shade_each_row(m, count_words, &words);
     for (size_t i = 0; i < m->n; i++)
         memcpy(packed + i * words, m->words[i], words * 4);
     return add_buffer(l, packed, (m->n ? m->n : 1) * words * 4);
@@ -388,6 +200,11 @@ static bool add_arguments(launch *l, const shade_run *run)
     return !pass->lights || add_buffer(l, run->frame.lights ? run->lights : &none, n * sizeof(light_t));
 }
 
+static int lanes_of(const shade_run *run)
+{
+    return run->lanes ? run->lanes : 16;
+}
+
 static double now_ms(void)
 {
     struct timespec t;
@@ -398,7 +215,7 @@ static double now_ms(void)
 static bool dispatch(launch *l, shade_run *run, rl_domain domain)
 {
     const frame_t *f = &run->frame;
-    size_t width = 16;
+    size_t width = (size_t)lanes_of(run);
     size_t size[2] = {(size_t)f->columns / (domain == RL_EVERY_VECTOR ? width : 1), (size_t)f->rows};
     run->best_ms = 1e30;
     for (int i = 0; i <= run->repeat; i++) {
@@ -420,7 +237,7 @@ static bool read_back(launch *l, const shade_run *run)
         const shade_image *image = run->images[i];
         if (!image || (port->role != RL_WRITE && port->role != RL_SCRATCH))
             continue;
-        size_t bytes = (image_floats(&run->frame, image->planes) - RL_GUARD) * sizeof(float);
+        size_t bytes = (shade_image_floats(&run->frame, image->planes) - RL_GUARD) * sizeof(float);
         if (clEnqueueReadBuffer(queue, l->buffers[i], CL_TRUE, 0, bytes, image->data, 0, NULL, NULL) !=
             CL_SUCCESS)
             return false;
@@ -440,7 +257,7 @@ bool shade_execute(shade_run *run)
     if (!shade_device() || !add_file(&text, "kernels/shared.h") || !add_file(&text, "kernels/common.cl") ||
         !add_file(&text, path))
         goto done;
-    l.program = build(rl_str_text(&text));
+    l.program = build(rl_str_text(&text), lanes_of(run));
     if (!l.program)
         goto done;
     l.kernel = clCreateKernel(l.program, run->pass->steps.rows[0].entry, &bad);
@@ -464,7 +281,7 @@ bool shade_function(const char *source, const char *entry, const float *in, floa
     if (!shade_device() || !add_file(&text, "kernels/shared.h") || !add_file(&text, "kernels/common.cl"))
         goto done;
     rl_str_printf(&text, "#line 1 \"%s\"\n%s", entry, source);
-    l.program = build(rl_str_text(&text));
+    l.program = build(rl_str_text(&text), 16);
     if (!l.program)
         goto done;
     l.kernel = clCreateKernel(l.program, entry, &bad);
@@ -478,10 +295,4 @@ done:
     free_launch(&l);
     rl_str_free(&text);
     return ok;
-}
-
-double shade_random(uint64_t *state)
-{
-    *state = *state * 6364136223846793005u + 1442695040888963407u;
-    return (double)(*state >> 11) * 0x1p-53;
 }

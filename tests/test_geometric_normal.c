@@ -91,6 +91,7 @@ static void agrees_with_twin(void **state)
         assert_true(shade_scene_make(&s, sizes[i][0], sizes[i][1], sizes[i][2], sizes[i][3], i + 40));
         const frame_t *f = &s.frame;
         shade_run run = normal_run(&s);
+        run.lanes = i == 2 ? 4 : i == 3 ? 8 : 16;
         assert_true(shade_execute(&run));
         for (int y = 0; y < f->rows; y++) {
             for (int x = 0; x < f->columns; x++) {
