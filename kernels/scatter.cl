@@ -14,6 +14,12 @@ enum { EXIT_SSS = 0, EXIT_LIGHTING = 1 };
 
 #define BURLEY_RADIUS 16.5644f /* in units of d: where P = 0.997 */
 
+/* The ports of the passes that are built on this, in their order. */
+#define SCATTER_PORTS                                                                                        \
+    global const float *diffuse, global const float *lit, global const float *albedo, global const float *normal, \
+        global const float *depth, global const uint *stencil, global float *area, global float *filtered,   \
+        global float *color, constant params_t *p, constant frame_t *f, constant material_t *materials
+
 /* What the filters read: planes in RL_PHASE4. */
 typedef struct inputs_t {
     global const float *diffuse, *depth, *area;

@@ -243,10 +243,7 @@ static inline void filter_material(const inputs_t *in, const vector_t *v, consta
     }
 }
 
-kernel void sss_burley_filter(global const float *diffuse, global const float *lit, global const float *albedo,
-                              global const float *normal, global const float *depth, global const uint *stencil,
-                              global float *area, global float *filtered, global float *color, constant params_t *p,
-                              constant frame_t *f, constant material_t *materials, constant float *tables)
+kernel void sss_burley_filter(SCATTER_PORTS, constant float *tables)
 {
     inputs_t in = {diffuse, depth, area, stencil, f};
     vector_t v = scatter_vector(f);
@@ -267,18 +264,12 @@ kernel void sss_burley_filter(global const float *diffuse, global const float *l
         rl_vstore(out[c], 0, filtered + c * f->plane4 + v.at);
 }
 
-kernel void sss_burley_area(global const float *diffuse, global const float *lit, global const float *albedo,
-                            global const float *normal, global const float *depth, global const uint *stencil,
-                            global float *area, global float *filtered, global float *color, constant params_t *p,
-                            constant frame_t *f, constant material_t *materials, constant float *tables)
+kernel void sss_burley_area(SCATTER_PORTS, constant float *tables)
 {
     AREA(scatter_area(depth, stencil, area, f);)
 }
 
-kernel void sss_burley_resolve(global const float *diffuse, global const float *lit, global const float *albedo,
-                               global const float *normal, global const float *depth, global const uint *stencil,
-                               global float *area, global float *filtered, global float *color, constant params_t *p,
-                               constant frame_t *f, constant material_t *materials, constant float *tables)
+kernel void sss_burley_resolve(SCATTER_PORTS, constant float *tables)
 {
     scatter_resolve(filtered, lit, albedo, normal, stencil, color, f, materials);
 }

@@ -131,10 +131,7 @@ static inline void filter_material(const inputs_t *in, const vector_t *v, int ma
         out[c] = rl_select(out[c], total.c[c] / total.w[c], mine & (total.w[c] > 0.0f));
 }
 
-kernel void sss_reference_filter(global const float *diffuse, global const float *lit, global const float *albedo,
-                                 global const float *normal, global const float *depth, global const uint *stencil,
-                                 global float *area, global float *filtered, global float *color,
-                                 constant params_t *p, constant frame_t *f, constant material_t *materials)
+kernel void sss_reference_filter(SCATTER_PORTS)
 {
     inputs_t in = {diffuse, depth, area, stencil, f};
     vector_t v = scatter_vector(f);
@@ -153,20 +150,14 @@ kernel void sss_reference_filter(global const float *diffuse, global const float
         rl_vstore(out[c], 0, filtered + c * f->plane4 + v.at);
 }
 
-kernel void sss_reference_area(global const float *diffuse, global const float *lit, global const float *albedo,
-                               global const float *normal, global const float *depth, global const uint *stencil,
-                               global float *area, global float *filtered, global float *color,
-                               constant params_t *p, constant frame_t *f, constant material_t *materials)
+kernel void sss_reference_area(SCATTER_PORTS)
 {
 #if P_weighting == WEIGHTING_AREA
     scatter_area(depth, stencil, area, f);
 #endif
 }
 
-kernel void sss_reference_resolve(global const float *diffuse, global const float *lit, global const float *albedo,
-                                  global const float *normal, global const float *depth, global const uint *stencil,
-                                  global float *area, global float *filtered, global float *color,
-                                  constant params_t *p, constant frame_t *f, constant material_t *materials)
+kernel void sss_reference_resolve(SCATTER_PORTS)
 {
     scatter_resolve(filtered, lit, albedo, normal, stencil, color, f, materials);
 }

@@ -1,6 +1,7 @@
 /* See cl_pass.h. */
 #define CL_TARGET_OPENCL_VERSION 120
 #include "tests/cl_pass.h"
+#include "tests/cl_pass_image.h"
 
 #include <CL/cl.h>
 #include <math.h>
@@ -81,92 +82,6 @@ void cl_close(cl_session **s)
     *s = NULL;
 }
 
-void cl_frame(frame_t *f, int x, int y, int width, int height, float focal)
-{
-    memset(f, 0, sizeof *f);
-    f->origin[0] = x & ~63;
-    f->origin[1] = y & ~3;
-    f->valid[0] = x - f->origin[0];
-    f->valid[1] = y - f->origin[1];
-    f->valid[2] = f->valid[0] + width;
-    f->valid[3] = f->valid[1] + height;
-    f->columns = (f->valid[2] + 63) & ~63;
-    f->rows = (f->valid[3] + 3) & ~3;
-    f->stride = f->columns;
-    f->plane = f->stride * f->rows;
-    f->stride4 = f->columns / 4 + 2 * RL_MARGIN4;
-    f->plane4 = f->stride4 * (f->rows / 4) * 16;
-    f->number = 1;
-    for (int i = 0; i < 3; i++)
-        f->camera.to_view[5 * i] = f->camera.to_world[5 * i] = 1;
-    f->camera.focal[0] = f->camera.focal[1] = focal;
-    f->camera.centre[0] = (float)x + 0.5f * (float)width;
-    f->camera.centre[1] = (float)y + 0.5f * (float)height;
-}
-
-/* ---- images in both layouts ---- */
-
-static int planes_of(rl_format format)
-{
-    return format == RL_RGB || format == RL_NORMAL ? 3 : format == RL_VEC2 ? 2 : 1;
-}
-
-static size_t place(const frame_t *f, rl_layout layout, int plane, int x, int y)
-{
-    if (layout == RL_LINEAR)
-        return (size_t)(RL_GUARD + plane * f->plane + y * f->stride + x);
-    int s = (y & 3) * 4 + (x & 3);
-    return (size_t)(plane * f->plane4 + (s * (f->rows >> 2) + (y >> 2)) * f->stride4 + RL_MARGIN4 + (x >> 2));
-}
-
-static size_t floats_of(const frame_t *f, const rl_port *port)
-{
-    int n = planes_of(port->format);
-    return (size_t)(port->layout == RL_LINEAR ? n * f->plane + 2 * RL_GUARD : n * f->plane4);
-}
-
-static void move_image(const frame_t *f, const rl_port *port, float *device, const void *from, float *to)
-{
-    for (int p = 0; p < planes_of(port->format); p++)
-        for (int y = 0; y < f->rows; y++)
-            for (int x = 0; x < f->columns; x++) {
-                size_t host = ((size_t)p * (size_t)f->rows + (size_t)y) * (size_t)f->columns + (size_t)x;
-                size_t at = place(f, port->layout, p, x, y);
-                if (from)
-                    memcpy(&device[at], (const float *)from + host, 4);
-                else
-                    to[host] = device[at];
-            }
-}
-
-static const cl_image *image_of(const cl_job *job, const rl_port *port)
-{
-    for (size_t i = 0; i < job->n_images; i++)
-        if (!strcmp(job->images[i].port, port->name) &&
-            (port->role == RL_READ ? !job->images[i].write : !!job->images[i].write))
-            return &job->images[i];
-    return NULL;
-}
-
-/* Whatever a kernel may not rely on is NaN: margins, guards and scratch. */
-static float *make_plane(const cl_job *job, const rl_port *port)
-{
-    const cl_image *image = image_of(job, port);
-    if (port->role == RL_READ && !(image && image->read))
-        return NULL;
-    size_t n = floats_of(job->frame, port);
-    float *data = rl_aligned(n * 4);
-    if (!data)
-        return NULL;
-    for (size_t i = 0; i < n; i++)
-        data[i] = NAN;
-    if (port->format == RL_ID)
-        memset(data, 0, n * 4);
-    if (port->role == RL_READ)
-        move_image(job->frame, port, data, image->read, NULL);
-    return data;
-}
-
 /* ---- programs ---- */
 
 static void add_fields(rl_str *s, const rl_params *rows, const char *group)
@@ -239,7 +154,7 @@ static bool program_text(const cl_job *job, rl_str *s)
             add_words(s, &pass->params.rows[i], job->params);
     for (size_t i = 0; i < pass->ports.n; i++) {
         const rl_port *port = &pass->ports.rows[i];
-        const cl_image *image = image_of(job, port);
+        const cl_image *image = cl_image_of(job, port);
         rl_str_printf(s, "#define HAS_%s %d\n#define LAYOUT_%s %d\n", port->name, image && image->read,
                       port->name, port->layout);
     }
@@ -356,11 +271,11 @@ bool cl_run(cl_session *s, const cl_job *job)
     ok = program != NULL;
     for (size_t i = 0; ok && i < pass->ports.n; i++) {
         const rl_port *port = &pass->ports.rows[i];
-        planes[i] = make_plane(job, port);
-        ok =
-            (planes[i] || port->optional) && add_buffer(s, &args, planes[i], floats_of(job->frame, port) * 4);
+        planes[i] = cl_make_plane(job, port);
+        ok = (planes[i] || port->optional) &&
+             add_buffer(s, &args, planes[i], cl_floats_of(job->frame, port) * 4);
         if (port->layout == RL_LINEAR && ok && planes[i]) { /* the kernel's pointer is behind the guard */
-            cl_buffer_region region = {RL_GUARD * 4, (floats_of(job->frame, port) - RL_GUARD) * 4};
+            cl_buffer_region region = {RL_GUARD * 4, (cl_floats_of(job->frame, port) - RL_GUARD) * 4};
             cl_int code;
             cl_mem part =
                 clCreateSubBuffer(args.mem[args.n - 1], 0, CL_BUFFER_CREATE_TYPE_REGION, &region, &code);
@@ -380,14 +295,15 @@ bool cl_run(cl_session *s, const cl_job *job)
     ok = ok && run_steps(s, job, program, &args);
     for (size_t i = 0; ok && i < pass->ports.n; i++) {
         const rl_port *port = &pass->ports.rows[i];
-        const cl_image *image = image_of(job, port);
+        const cl_image *image = cl_image_of(job, port);
         if (port->role == RL_READ || !image)
             continue;
-        size_t skip = port->layout == RL_LINEAR ? RL_GUARD * 4 : 0, bytes = floats_of(job->frame, port) * 4;
+        size_t skip = port->layout == RL_LINEAR ? RL_GUARD * 4 : 0,
+               bytes = cl_floats_of(job->frame, port) * 4;
         ok = !failed("clEnqueueReadBuffer",
                      clEnqueueReadBuffer(s->queue, args.mem[i], CL_TRUE, 0, bytes - skip,
                                          (char *)planes[i] + skip, 0, NULL, NULL));
-        move_image(job->frame, port, planes[i], NULL, image->write);
+        cl_move_image(job->frame, port, planes[i], NULL, image->write);
     }
     for (cl_uint i = 0; i < args.n; i++)
         if (args.mem[i])
