@@ -1,33 +1,46 @@
-# relit: every user command. `make demo` and `make test` are the two to know; `make help` lists the rest.
+# relit: every user command. `make demo` and `make test` are the two to know.
+#
+#   make demo        install what is missing, build, re-light the bundled capture
+#   make test        install what the tests miss, build, run them all
+#   make             build build/relit, build/librelit.a, build/librelit.so and the modules
+#   make test-asan   the tests under AddressSanitizer and UndefinedBehaviorSanitizer
+#   make bench       kernels and codecs against their peers
+#   make install     PREFIX=/usr/local: program, library, headers, relit.pc, configs, kernels
+#   make deps        Debian packages
+#   make format      clang-format; make layers: includes point one way only
 
 BUILD   ?= build
 PREFIX  ?= /usr/local
+DESTDIR ?=
 CC      ?= cc
 CXX     ?= c++
 PKGS     = OpenEXR yaml-0.1 jansson libxxhash libdeflate libisal
 WARN     = -Wall -Wextra -Wpedantic -Wshadow -Wconversion
 OPT     ?= -O2 -g
 SAN     ?=
-# No fused multiply-adds and no reordering: the same bits on every machine.
-CFLAGS  += -std=c11 -D_GNU_SOURCE $(OPT) $(SAN) $(WARN) -Wstrict-prototypes -Wmissing-prototypes -ffp-contract=off -fPIC -pthread
+# No contraction and no reordering of floating point: the same bits on every machine.
+CFLAGS   += -std=c11 -D_GNU_SOURCE $(OPT) $(SAN) $(WARN) -Wstrict-prototypes -Wmissing-prototypes \
+            -ffp-contract=off -fPIC -pthread
 CXXFLAGS += -std=c++17 $(OPT) $(SAN) -Wall -Wextra -Wshadow -fPIC -pthread
 CPPFLAGS += -I. $(shell pkg-config --cflags $(PKGS) 2>/dev/null)
-LDFLAGS += $(SAN) -pthread -Wl,--as-needed
+LDFLAGS  += $(SAN) -pthread -Wl,--as-needed
+LIBS      = $(shell pkg-config --libs $(PKGS) OpenColorIO) -lOpenCL -lstdc++ -ldl -lm
 
 # ---- what is built -------------------------------------------------------------------------------------------
-LIB_C   := $(wildcard graph/base/*.c graph/model/*.c graph/run/*.c passes/*.c)
-LIB_CXX := $(wildcard graph/run/*.cc)
+
 # OpenImageIO takes a quarter of a second to load: its shim is a module of its own, loaded on first use.
 MODULE_CXX := graph/run/shim_oiio.cc
-LIB_CXX := $(filter-out $(MODULE_CXX),$(LIB_CXX))
+LIB_C   := $(wildcard graph/base/*.c graph/model/*.c graph/run/*.c passes/*.c)
+LIB_CXX := $(filter-out $(MODULE_CXX),$(wildcard graph/run/*.cc))
 TOOL_C  := $(wildcard graph/tool/*.c)
-LIB_O   := $(LIB_C:%.c=$(BUILD)/%.o) $(LIB_CXX:%.cc=$(BUILD)/%.o)
+KERNELS := kernels/shared.h $(wildcard kernels/*.cl)
+LIB_O   := $(LIB_C:%.c=$(BUILD)/%.o) $(LIB_CXX:%.cc=$(BUILD)/%.o) $(BUILD)/kernels.o
 TOOL_O  := $(TOOL_C:%.c=$(BUILD)/%.o)
-LIBS    = $(shell pkg-config --libs $(PKGS)) $(shell pkg-config --libs OpenColorIO) -lOpenCL -lstdc++ -ldl -lm
+MAIN_O  := $(BUILD)/graph/tool/relit.o
 TESTS   := $(patsubst tests/%.c,$(BUILD)/tests/%,$(wildcard tests/test_*.c))
-TEST_HELP_O := $(patsubst tests/%.c,$(BUILD)/tests/%.o,$(filter-out tests/test_%.c,$(wildcard tests/*.c)))
+HELP_O  := $(patsubst tests/%.c,$(BUILD)/tests/%.o,$(filter-out tests/test_%.c tests/bench_%.c,$(wildcard tests/*.c)))
 
-all: $(BUILD)/relit $(BUILD)/librelit.a $(BUILD)/relit_oiio.so
+all: $(BUILD)/relit $(BUILD)/librelit.a $(BUILD)/librelit.so $(BUILD)/relit_oiio.so
 
 $(BUILD)/%.o: %.c
 	@mkdir -p $(@D)
@@ -39,33 +52,109 @@ $(BUILD)/%.o: %.cc
 
 $(BUILD)/librelit.a: $(LIB_O)
 	@rm -f $@
-	ar rcs $@ $^
+	@ar rcs $@ $^
+
+$(BUILD)/librelit.so: $(LIB_O)
+	$(CC) $(LDFLAGS) -shared -Wl,-soname,librelit.so -o $@ $^ $(LIBS)
+
+# All of the tool but main(): tests call it in their own process.
+$(BUILD)/tool.a: $(filter-out $(MAIN_O),$(TOOL_O))
+	@rm -f $@
+	@ar rcs $@ $^
+
+$(BUILD)/relit: $(MAIN_O) $(BUILD)/tool.a $(BUILD)/librelit.a
+	$(CC) $(LDFLAGS) -o $@ $^ $(LIBS)
 
 $(BUILD)/relit_oiio.so: $(MODULE_CXX:%.cc=$(BUILD)/%.o)
 	$(CXX) $(LDFLAGS) -shared -o $@ $^ $(shell pkg-config --libs OpenImageIO)
 
-# Where `make install` puts the module; it is also found beside the program.
+# Kernels are built into the library, so that it runs from anywhere; $RELIT_KERNELS overrides them.
+$(BUILD)/kernels.c: $(KERNELS) Makefile
+	@mkdir -p $(@D)
+	@{ echo '/* generated from kernels/ */'; \
+	  n=0; for k in $(KERNELS); do echo "static const unsigned char k$$n[] = {"; \
+	    od -An -v -tu1 $$k | sed 's/  */,/g;s/^,//;s/$$/,/'; echo '0};'; n=$$((n+1)); done; \
+	  echo 'typedef struct embedded { const char *name; const unsigned char *text; } embedded;'; \
+	  echo 'extern const embedded rl_embedded_kernels[];'; \
+	  echo 'const embedded rl_embedded_kernels[] = {'; \
+	  n=0; for k in $(KERNELS); do echo "{\"$$(basename $$k)\", k$$n},"; n=$$((n+1)); done; \
+	  echo '{0, 0}};'; } > $@.tmp && mv $@.tmp $@
+$(BUILD)/kernels.o: $(BUILD)/kernels.c
+	$(CC) $(CPPFLAGS) $(CFLAGS) -c $< -o $@
+
+# Where `make install` puts things that are looked for at run time; a build tree finds its own first.
 $(BUILD)/graph/run/image_module.o: CPPFLAGS += -DRL_MODULE_DIR='"$(PREFIX)/lib/relit"'
-
-$(BUILD)/relit: $(TOOL_O) $(BUILD)/librelit.a
-	$(CC) $(LDFLAGS) -o $@ $^ $(LIBS)
-
-$(BUILD)/tests/%: $(BUILD)/tests/%.o $(TEST_HELP_O) $(BUILD)/librelit.a
-	$(CC) $(LDFLAGS) -o $@ $^ $(LIBS) -lcmocka
+$(BUILD)/graph/run/data_files.o: CPPFLAGS += -DRELIT_DATADIR='"$(PREFIX)/share/relit/configs"'
 
 .SECONDARY:
 -include $(shell find $(BUILD) -name '*.d' 2>/dev/null)
 
-test-build: $(TESTS) $(BUILD)/relit_oiio.so
-$(BUILD)/tests/test_image_file: | $(BUILD)/relit_oiio.so
+# ---- user commands ---------------------------------------------------------------------------------------------
 
-test: test-build
-	@tests/run.sh $(TESTS)
+demo: deps
+	@$(MAKE) --no-print-directory -j2 all
+	@echo
+	$(BUILD)/relit run configs/skin.yaml --out out/demo
+	$(BUILD)/relit run configs/skin_off.yaml --out out/demo_off --frames 8
+	@echo; echo "With scattering:"; ls out/demo/*.png out/demo/*.exr; echo "Without:"; ls out/demo_off/*.png
 
+# ---- tests -----------------------------------------------------------------------------------------------------
+
+# An archive: a test gets the helpers that it uses, and what those need.
+$(BUILD)/tests/help.a: $(HELP_O)
+	@rm -f $@
+	@ar rcs $@ $^
+
+$(BUILD)/tests/%: $(BUILD)/tests/%.o $(BUILD)/tests/help.a $(BUILD)/tool.a $(BUILD)/librelit.a
+	$(CC) $(LDFLAGS) -o $@ $^ $(LIBS) -lcmocka
+
+test-build: all $(TESTS)
+
+test: deps
+	@$(MAKE) --no-print-directory -j2 test-build layers
+	@BUILD=$(BUILD) tests/run.sh $(TESTS)
+
+test-asan:
+	@$(MAKE) --no-print-directory -j2 BUILD=build-asan SAN="-fsanitize=address,undefined -fno-sanitize-recover=undefined" test-build
+	@BUILD=build-asan ASAN_OPTIONS=detect_leaks=0 tests/run.sh $(patsubst $(BUILD)/%,build-asan/%,$(TESTS))
+
+# ---- the rest --------------------------------------------------------------------------------------------------
+
+DEB = build-essential pkg-config libopenexr-dev libopenimageio-dev libopencolorio-dev pocl-opencl-icd ocl-icd-opencl-dev \
+      opencl-headers libyaml-dev libjansson-dev libxxhash-dev libdeflate-dev libisal-dev libcmocka-dev libgraphviz-dev
+
+# Asks for root rights only when something is missing.
+deps:
+	@missing=""; for p in $(DEB); do \
+	  dpkg-query -W -f '$${Status}' $$p 2>/dev/null | grep -q 'ok installed' || missing="$$missing $$p"; done; \
+	if [ -n "$$missing" ]; then \
+	  echo "installing:$$missing"; \
+	  sudo=""; [ "$$(id -u)" = 0 ] || sudo=sudo; \
+	  $$sudo apt-get update -qq && DEBIAN_FRONTEND=noninteractive $$sudo apt-get install -y -qq --no-install-recommends $$missing; \
+	fi
+
+install: all
+	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/lib/pkgconfig $(DESTDIR)$(PREFIX)/lib/relit \
+	  $(DESTDIR)$(PREFIX)/include/relit/graph/base $(DESTDIR)$(PREFIX)/share/relit/kernels
+	install -m 755 $(BUILD)/relit $(DESTDIR)$(PREFIX)/bin/
+	install -m 644 $(BUILD)/librelit.a $(BUILD)/librelit.so $(DESTDIR)$(PREFIX)/lib/
+	install -m 644 $(BUILD)/relit_oiio.so $(DESTDIR)$(PREFIX)/lib/relit/
+	install -m 644 graph/relit.h $(DESTDIR)$(PREFIX)/include/relit/graph/
+	install -m 644 graph/base/error.h graph/base/log.h $(DESTDIR)$(PREFIX)/include/relit/graph/base/
+	install -m 644 $(KERNELS) $(DESTDIR)$(PREFIX)/share/relit/kernels/
+	cp -R configs $(DESTDIR)$(PREFIX)/share/relit/
+	sed -e 's|@PREFIX@|$(PREFIX)|' -e 's|@VERSION@|$(VERSION)|' graph/relit.pc.in > $(DESTDIR)$(PREFIX)/lib/pkgconfig/relit.pc
+
+VERSION := $(shell sed -n 's/^.define RL_VERSION "\(.*\)"/\1/p' graph/relit.h)
+
+FORMATTED = $(shell git ls-files '*.c' '*.h' '*.cc' '*.hh')
 format:
-	@clang-format -i $$(git ls-files '*.c' '*.h' '*.cc')
+	clang-format -i $(FORMATTED)
+
+layers:
+	@tests/layers.sh
 
 clean:
-	rm -rf $(BUILD)
+	rm -rf $(BUILD) build-asan
 
-.PHONY: all test test-build format clean
+.PHONY: all demo test test-build test-asan deps install format layers clean

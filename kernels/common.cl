@@ -154,6 +154,36 @@ static inline float rl_max_lane(floatv v)
     return m;
 }
 
+/* Whether any lane is set; a uniform answer, cheap enough to leave a branch early. */
+static inline int rl_any(intv mask)
+{
+#if RL_W == 16
+    int8 a = mask.lo | mask.hi;
+    int4 b = a.lo | a.hi;
+#elif RL_W == 8
+    int4 b = mask.lo | mask.hi;
+#else
+    int4 b = mask;
+#endif
+    int2 c = b.lo | b.hi;
+    return (c.x | c.y) != 0;
+}
+
+/* The largest id of a vector. */
+static inline uint rl_max_id(uintv v)
+{
+#if RL_W == 16
+    uint8 a = max(v.lo, v.hi);
+    uint4 b = max(a.lo, a.hi);
+#elif RL_W == 8
+    uint4 b = max(v.lo, v.hi);
+#else
+    uint4 b = v;
+#endif
+    uint2 c = max(b.lo, b.hi);
+    return max(c.x, c.y);
+}
+
 /* ---- camera ----------------------------------------------------------------------------------------------- */
 
 /* Metres on the plane z = -1 for pixel x (buffer coordinates), jitter included; y alike, up positive. */
@@ -169,7 +199,7 @@ static inline float rl_ray_y(constant frame_t *f, constant camera_t *c, float y)
 
 /* ---- functions ---------------------------------------------------------------------------------------------- */
 
-/* 2^x for x in [-126, 126]; smaller x give 0 (below -126) . Relative error below 2e-7 (tests/test_kernel_math.c). Not
+/* 2^x for x in [-126, 126]; smaller x give 0 (below -126). Relative error below 1e-7 (tests/test_kernel_math.c). Not
  * for -cl-fast-relaxed-math, which deletes the rounding. */
 static inline floatv rl_exp2(floatv x)
 {
@@ -179,13 +209,13 @@ static inline floatv rl_exp2(floatv x)
     floatv r = x + magic;
     floatv i = r - magic;
     floatv t = x - i; /* -0.5 … 0.5 */
-    /* minimax, degree 6 */
-    floatv p = 1.5403530e-4f;
-    p = fma(p, t, 1.3333558e-3f);
-    p = fma(p, t, 9.6181291e-3f);
-    p = fma(p, t, 5.5504109e-2f);
-    p = fma(p, t, 2.4022651e-1f);
-    p = fma(p, t, 6.9314718e-1f);
+    /* minimax, degree 6, p(0) = 1: error 2e-9, then rounding */
+    floatv p = 1.5353371e-4f;
+    p = fma(p, t, 1.3398878e-3f);
+    p = fma(p, t, 9.6184374e-3f);
+    p = fma(p, t, 5.5503325e-2f);
+    p = fma(p, t, 2.4022648e-1f);
+    p = fma(p, t, 6.9314720e-1f);
     p = fma(p, t, 1.0f);
     intv e = (rl_as_intv(r) - rl_as_intv((floatv)magic)) << 23;
     floatv y = rl_as_floatv(rl_as_intv(p) + e);

@@ -1,27 +1,27 @@
-/* What the host and the kernels both know. Compiles as C11 and as OpenCL C 1.2: only 4-byte scalars and arrays
- * of them, so that the layout is the same everywhere.
+/* What the host and the kernels both know. Compiles as C11 and as OpenCL C 1.2: only 4-byte scalars and
+ * arrays of them, so that the layout is the same everywhere.
  *
  * Buffers and pixels. A frame's data window is placed in buffers whose left edge lies on a multiple of 64 and
- * whose top edge on a multiple of 4 in display-window pixels; `columns` is a multiple of 64, `rows` of 4. So a
- * vector of pixels is the same vector whatever the crop. Kernels work in buffer coordinates; x + origin[0],
- * y + origin[1] are display-window pixels. Outside of the valid rectangle stencil = 0, depth = 0 and every other
- * layer is 0.
+ * whose top edge on a multiple of 4 in display-window pixels; `columns` is a multiple of 64, `rows` of 4. So
+ * a vector of pixels is the same vector whatever the crop. Kernels work in buffer coordinates; x + origin[0],
+ * y + origin[1] are display-window pixels. Outside of the valid rectangle stencil = 0, depth = 0 and every
+ * other layer is 0.
  *
- * RL_LINEAR: pixel (x, y) of plane p is at p*plane + y*stride + x. RL_GUARD floats before and behind the image can
- * be read (not written), so that unaligned vectors one pixel off stay inside.
+ * RL_LINEAR: pixel (x, y) of plane p is at p*plane + y*stride + x. RL_GUARD floats before and behind the
+ * image can be read (not written), so that unaligned vectors one pixel off stay inside.
  *
  * RL_PHASE4: pixel (x, y) is in sub-image s = (y&3)*4 + (x&3), at
- * p*plane4 + (s*(rows/4) + y/4)*stride4 + RL_MARGIN4 + x/4. The RL_MARGIN4 elements on both sides of a sub-row
- * can be read; in the stencil they are 0. */
+ * p*plane4 + (s*(rows/4) + y/4)*stride4 + RL_MARGIN4 + x/4. The RL_MARGIN4 elements on both sides of a
+ * sub-row can be read; in the stencil they are 0. */
 #ifndef RL_SHARED_H
 #define RL_SHARED_H
 
-#define RL_GUARD   64
+#define RL_GUARD   128
 #define RL_MARGIN4 16
 
-/* x right, y down in pixels; view space is right-handed, +x right, +y up, looks down -z; metres. The sample of
- * pixel (x, y) lies at display position (x + 0.5 + jitter[0], y + 0.5 + jitter[1]) and
- *     view = ((px - centre[0]) / focal[0] * depth, -(py - centre[1]) / focal[1] * depth, -depth). */
+/* x right, y down in pixels; view space is right-handed, +x right, +y up, looks down -z; metres. The sample
+ * of pixel (x, y) lies at display position (x + 0.5 + jitter[0], y + 0.5 + jitter[1]) and view = ((px -
+ * centre[0]) / focal[0] * depth, -(py - centre[1]) / focal[1] * depth, -depth). */
 typedef struct camera_t {
     float to_view[12];  /* 3 rows of 4, column vectors: view = M * (world, 1) */
     float to_world[12]; /* its inverse */
@@ -31,29 +31,29 @@ typedef struct camera_t {
 } camera_t;
 
 typedef struct frame_t {
-    int columns, rows;  /* of the buffers */
-    int valid[4];       /* x0, y0, x1, y1 in buffer coordinates, x1 and y1 exclusive */
-    int origin[2];      /* display-window pixel of buffer pixel (0, 0) */
-    int stride, plane;  /* RL_LINEAR: floats from row to row, from plane to plane */
+    int columns, rows;   /* of the buffers */
+    int valid[4];        /* x0, y0, x1, y1 in buffer coordinates, x1 and y1 exclusive */
+    int origin[2];       /* display-window pixel of buffer pixel (0, 0) */
+    int stride, plane;   /* RL_LINEAR: floats from row to row, from plane to plane */
     int stride4, plane4; /* RL_PHASE4: floats from sub-row to sub-row, from plane to plane */
-    int number;         /* absolute frame number */
-    int history;        /* 1: history ports hold the frame before; 0: they hold nothing */
-    int materials;      /* entries of the material table, the empty one included */
-    int lights;         /* entries of the light table */
+    int number;          /* absolute frame number */
+    int history;         /* 1: history ports hold the frame before; 0: they hold nothing */
+    int materials;       /* entries of the material table, the empty one included */
+    int lights;          /* entries of the light table */
     camera_t camera;
-    camera_t previous;  /* of the frame that history holds */
+    camera_t previous; /* of the frame that history holds */
 } frame_t;
 
 enum { LIGHT_POINT = 0, LIGHT_SPOT = 1, LIGHT_DIRECTIONAL = 2 };
 
 typedef struct light_t {
     int type;
-    float position[3];   /* world, metres */
-    float direction[3];  /* world, unit: where the light travels */
-    float intensity[3];  /* W/sr; directional: W/m2; working space */
+    float position[3];          /* world, metres */
+    float direction[3];         /* world, unit: where the light travels */
+    float intensity[3];         /* W/sr; directional: W/m2; working space */
     float cos_inner, cos_outer; /* spot: full inside, none outside (cosines of half angles) */
-    int shadow;           /* plane of the shadow port, -1: visibility is 1 */
-    int shadow_thickness; /* plane of the shadow_thickness port, -1: 0 */
+    int shadow;                 /* plane of the shadow port, -1: visibility is 1 */
+    int shadow_thickness;       /* plane of the shadow_thickness port, -1: 0 */
 } light_t;
 
 #endif

@@ -40,7 +40,9 @@ void *rl_malloc(size_t bytes)
 
 void *rl_calloc(size_t count, size_t size)
 {
-    return must_fail() ? NULL : counted(calloc(count ? count : 1, size ? size : 1));
+    if (must_fail() || (size && count > SIZE_MAX / size))
+        return NULL;
+    return counted(calloc(count ? count : 1, size ? size : 1));
 }
 
 void *rl_realloc(void *p, size_t bytes)

@@ -10,7 +10,8 @@
 extern "C" {
 #endif
 
-/* Rows and buffers start at this many bytes: a cache line, a 512-bit vector, and PoCL's extended alignment. */
+/* Rows and buffers start at this many bytes: a cache line, a 512-bit vector, and PoCL's extended alignment.
+ */
 #define RL_ALIGN 128
 
 /* NULL when memory is out. Size 0 gives a pointer that can be freed. Free with rl_free. */

@@ -22,7 +22,8 @@ static rl_code read_all(int fd, const char *path, char **data, size_t *size, rl_
         return io_error(err, path, "cannot be read");
     if (S_ISDIR(st.st_mode))
         return rl_fail_file(err, RL_E_IO, path, "cannot be read: it is a folder");
-    size_t room = st.st_size > 0 ? (size_t)st.st_size : 4096, used = 0;
+    size_t room = st.st_size > 0 ? (size_t)st.st_size + 1 : 4096,
+           used = 0; /* + 1: the read that finds the end */
     char *text = rl_malloc(room + 1);
     rl_code code = RL_OK;
     while (text) {
@@ -69,6 +70,13 @@ rl_code rl_file_read(const char *path, char **data, size_t *size, rl_error *err)
     return code;
 }
 
+/* A device or a pipe, such as /dev/stdout: must not be replaced by a file of its name. */
+static bool is_special(const char *path)
+{
+    struct stat st;
+    return stat(path, &st) == 0 && !S_ISREG(st.st_mode) && !S_ISDIR(st.st_mode);
+}
+
 rl_code rl_file_temp(const char *path, char *out, size_t size, rl_error *err)
 {
     static atomic_uint serial;
@@ -84,7 +92,9 @@ rl_code rl_file_commit(const char *temp, const char *path, rl_error *err)
 {
     rl_code code = RL_OK;
     int fd = open(temp, O_RDONLY | O_CLOEXEC);
-    if (fd < 0 || fsync(fd) || rename(temp, path))
+    if (is_special(path))
+        code = rl_fail_file(err, RL_E_IO, path, "cannot be written: it is no plain file");
+    else if (fd < 0 || fsync(fd) || rename(temp, path))
         code = io_error(err, path, "cannot be written");
     if (fd >= 0)
         close(fd);
@@ -98,24 +108,34 @@ void rl_file_discard(const char *temp)
     unlink(temp);
 }
 
+static rl_code write_all(int fd, const char *path, const void *data, size_t size, rl_error *err)
+{
+    for (size_t done = 0; done < size;) {
+        ssize_t n = write(fd, (const char *)data + done, size - done);
+        if (n < 0 && errno != EINTR)
+            return io_error(err, path, "cannot be written");
+        if (n > 0)
+            done += (size_t)n;
+    }
+    return RL_OK;
+}
+
 rl_code rl_file_write(const char *path, const void *data, size_t size, rl_error *err)
 {
     char temp[4096];
-    if (rl_file_temp(path, temp, sizeof temp, err))
-        return err ? err->code : RL_E_IO;
-    int fd = open(temp, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    bool special = is_special(path);
+    rl_code code = special ? RL_OK : rl_file_temp(path, temp, sizeof temp, err);
+    if (code)
+        return code;
+    int fd = special ? open(path, O_WRONLY | O_CLOEXEC)
+                     : open(temp, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
     if (fd < 0)
         return io_error(err, path, "cannot be written");
-    rl_code code = RL_OK;
-    for (size_t done = 0; !code && done < size;) {
-        ssize_t n = write(fd, (const char *)data + done, size - done);
-        if (n < 0 && errno != EINTR)
-            code = io_error(err, path, "cannot be written");
-        else if (n > 0)
-            done += (size_t)n;
-    }
+    code = write_all(fd, path, data, size, err);
     if (close(fd) && !code)
         code = io_error(err, path, "cannot be written");
+    if (special)
+        return code;
     if (code) {
         unlink(temp);
         return code;

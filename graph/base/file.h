@@ -16,7 +16,7 @@ extern "C" {
 rl_code rl_file_read(const char *path, char **data, size_t *size, rl_error *err);
 
 /* Writes a file so that it is whole under its name or not there at all: temporary name in the same folder,
- * fsync, rename. */
+ * fsync, rename. A device or a pipe (/dev/stdout) is written to, not replaced. */
 rl_code rl_file_write(const char *path, const void *data, size_t size, rl_error *err);
 
 /* For writers that need a path of their own: a fresh name beside `path` (in `out`, room for `size` bytes);

@@ -105,28 +105,48 @@ bool rl_parse_int(const char *text, long long *out)
     return true;
 }
 
-static char *format_shortest(double value, int first, int last, bool single, char *out)
+/* "1e+10" -> "1e10", "1e-05" -> "1e-5" */
+static void trim_exponent(char *text)
+{
+    char *e = strchr(text, 'e');
+    if (!e)
+        return;
+    char *to = e + 1, *from = e + 1;
+    if (*from == '-')
+        *to++ = *from++;
+    else if (*from == '+')
+        from++;
+    while (*from == '0' && from[1])
+        from++;
+    memmove(to, from, strlen(from) + 1);
+}
+
+static char *format_shortest(double value, int last, bool single, char *out)
 {
     pthread_once(&c_locale_once, make_c_locale);
     locale_t before = uselocale(c_locale);
-    for (int digits = first; digits <= last; digits++) {
+    for (int digits = 1; digits <= last; digits++) {
         snprintf(out, 32, "%.*g", digits, value);
         double back = strtod(out, NULL);
         if (single ? (float)back == (float)value : back == value)
             break;
     }
+    /* 100 and not 1e+02: what %g writes with an exponent of 0 or more is an integer, and below 1e6 exact */
+    if (strchr(out, 'e') && fabs(value) >= 1 && fabs(value) < 1e6)
+        snprintf(out, 32, "%.0f", value);
     uselocale(before);
+    trim_exponent(out);
     return out;
 }
 
 char *rl_format_float(float value, char *out)
 {
-    return format_shortest((double)value, 1, 9, true, out);
+    return format_shortest((double)value, 9, true, out);
 }
 
 char *rl_format_double(double value, char *out)
 {
-    return format_shortest(value, 1, 17, false, out);
+    return format_shortest(value, 17, false, out);
 }
 
 bool rl_parse_bytes(const char *text, unsigned long long *out)
@@ -159,7 +179,10 @@ char *rl_format_bytes(unsigned long long bytes, char *out)
     int u = 0;
     for (; v >= 1024 && u < 4; u++)
         v /= 1024;
+    pthread_once(&c_locale_once, make_c_locale);
+    locale_t before = uselocale(c_locale);
     snprintf(out, 32, u ? "%.1f %s" : "%.0f %s", v, units[u]);
+    uselocale(before);
     return out;
 }
 

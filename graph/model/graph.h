@@ -1,4 +1,5 @@
-/* The graph: nodes and images, every name resolved to an index, formats checked, cycles found. Constant once made. */
+/* The graph: nodes and images, every name resolved to an index, formats checked, cycles found. Constant once
+ * made. */
 #ifndef RL_MODEL_GRAPH_H
 #define RL_MODEL_GRAPH_H
 
@@ -9,9 +10,9 @@
 extern "C" {
 #endif
 
-/* A layer that the capture can give, after conversion (DESIGN 2). "shadow" and "shadow_thickness" stand for a plane per
- * light (RL_LIGHTS, planes = number of active lights with such a layer, absent when 0); besides there is one RL_SCALAR
- * layer for each light of the capture, "shadow.key". */
+/* A layer that the capture can give, after conversion (DESIGN 2). "shadow" and "shadow_thickness" stand for a
+ * plane per light (RL_LIGHTS, planes = number of active lights with such a layer, absent when 0); besides
+ * there is one RL_SCALAR layer for each light of the capture, "shadow.key". */
 typedef struct rl_layer_info {
     const char *name;
     rl_format format;
@@ -31,7 +32,8 @@ typedef struct rl_graph_node {
     rl_where where;
     const rl_pass *pass;
     const void *params;
-    const int *images; /* a port: the image that it reads or writes, or whose past it reads; -1: absent, or scratch */
+    const int *images; /* a port: the image that it reads or writes, or whose past it reads; -1: absent, or
+                          scratch */
 } rl_graph_node;
 
 typedef struct rl_graph_output {
@@ -49,9 +51,9 @@ typedef struct rl_graph {
     size_t n_outputs;
 } rl_graph;
 
-/* An output that the graph must make: `layers[i]` names an image; `convert[i]` (may be NULL) is a pass with one READ and
- * one WRITE port, such as a colour transform, that is put between that image and the output as a node of its own,
- * "output.NAME" or, with several layers, "output.NAME.LAYER". */
+/* An output that the graph must make: `layers[i]` names an image; `convert[i]` (may be NULL) is a pass with
+ * one READ and one WRITE port, such as a colour transform, that is put between that image and the output as a
+ * node of its own, "output.NAME" or, with several layers, "output.NAME.LAYER". */
 typedef struct rl_wanted {
     const char *name;
     rl_where where;
@@ -61,10 +63,11 @@ typedef struct rl_wanted {
     size_t n_layers;
 } rl_wanted;
 
-/* Binds ports: a named input to its image; an unnamed one to the capture layer of the port's name; an optional one
- * without such a layer stays absent; else an error that names node, pass, port and layer. Errors: unknown image, node,
- * port (nearest name), a wrong format ("port 'depth' takes a scalar, 'light.diffuse' is rgb"), an input given twice, a
- * cycle (printed whole: "sss -> aa -> sss"; history makes no edge). */
+/* Binds ports: a named input to its image; an unnamed one to the capture layer of the port's name; an
+ * optional one without such a layer stays absent; else an error that names node, pass, port and layer.
+ * Errors: unknown image, node, port (nearest name), a wrong format ("port 'depth' takes a scalar,
+ * 'light.diffuse' is rgb"), an input given twice, a cycle (printed whole: "sss -> aa -> sss"; history makes
+ * no edge). */
 rl_code rl_graph_build(rl_arena *arena, const rl_node *nodes, size_t n_nodes, const rl_layer_info *layers,
                        size_t n_layers, const rl_wanted *wanted, size_t n_wanted, const rl_graph **out,
                        rl_error *err);

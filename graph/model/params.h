@@ -10,25 +10,35 @@
 extern "C" {
 #endif
 
-/* The default of a row, written to out (RL_PARAM_BYTES(row->type) bytes). */
+/* An error whose text ends in "; did you mean …? known: …" (n names, in any order). text == NULL stands for
+ * memory that is out, so that the result of rl_arena_printf can be handed over unseen. */
+rl_code rl_fail_suggest(rl_error *err, rl_where where, const char *text, const char *name,
+                        const char *const *known, size_t n);
+
+/* The default of a row, or -1 for .no_default rows, written to out (RL_PARAM_BYTES(row->type) bytes). */
 void rl_param_default(const rl_param *row, void *out);
 
 /* One value: type and range checked in double before narrowing, NaN refused, words known with did-you-mean.
  * `out` gets RL_PARAM_BYTES(row->type) bytes. */
 rl_code rl_param_read(const rl_param *row, const rl_value *v, void *out, rl_error *err);
 
-/* A pass's struct (pass->params_size bytes in the arena): defaults, then what the node's map says. Keys named in
- * `also` (such as "pass" and "in") are skipped; any other unknown key is an error that reads
- * "pass 'sss' (sss_burley) has no parameter 'tapps'; did you mean 'taps'? known: …". */
+/* A pass's struct (pass->params_size bytes in the arena): defaults, then what the node's map (may be NULL)
+ * says. Keys named in `also` (such as "pass" and "in") are skipped; any other unknown key is an error that
+ * reads "pass 'sss' (sss_burley) has no parameter 'tapps'; did you mean 'taps'? known: …". */
 rl_code rl_params_read(rl_arena *arena, const rl_pass *pass, const char *node, const rl_value *map,
                        const char *const *also, size_t n_also, const void **out, rl_error *err);
 
 /* A value as YAML text ("auto", "screen", "0.05", "[1, 0, 0]"), appended to s. */
 void rl_param_print(const rl_param *row, const void *value, rl_str *s);
-/* The row's range and default for people: "0 … 1, default 0.05 ratio", "screen|tangent, default screen". */
+/* The row's range and default for people: "0 … 1, default 0.05 ratio", "screen|tangent, default screen",
+ * "0 … 1 ratio, no default" for .no_default rows. */
 void rl_param_describe(const rl_param *row, rl_str *s);
 
-/* The OpenCL text of a struct with these rows, in order: "typedef struct params_t { float blend; } params_t;". */
+/* A row as a field of an OpenCL struct, "float blend;" or, with the prefix "profile_", "float
+ * profile_weight[3];". */
+void rl_param_field(const rl_param *row, const char *prefix, rl_str *s);
+/* The OpenCL text of a struct with these rows, in order: "typedef struct params_t { float blend; } params_t;"
+ * and a newline; nothing when there are no rows. */
 void rl_params_struct_text(rl_params params, const char *name, rl_str *s);
 
 #ifdef __cplusplus

@@ -49,6 +49,7 @@ typedef struct rl_param {
     const char *source;  /* where the idea is from, or NULL */
     bool structural;     /* a #define P_NAME for the program, since the code itself depends on it */
     bool required;       /* profile rows: every profile that a material uses must give it */
+    bool no_default;     /* rows of the material table with min >= 0: the device sees -1 where it is not given */
 } rl_param;
 
 #define RL_ARRAY_LENGTH(a) (sizeof(a) / sizeof *(a))
@@ -144,6 +145,7 @@ typedef struct rl_pass {
     const char *help;        /* one line */
     const char *source;      /* paper, talk, equation */
     const char *kernel;      /* file in kernels/, or NULL when kernel_text is set */
+    const char *kernel_prelude; /* another file in kernels/, put in front of it; NULL = none */
     const char *kernel_text; /* the program itself, for passes built at run time; named kernel_file in errors */
     const char *kernel_file;
     rl_params params;

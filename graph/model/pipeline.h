@@ -1,9 +1,11 @@
-/* A pipeline file (DESIGN 3), parsed and checked on its own: what can be known without opening the capture. */
+/* A pipeline file (DESIGN 3), parsed and checked on its own: what can be known without opening the capture.
+ */
 #ifndef RL_MODEL_PIPELINE_H
 #define RL_MODEL_PIPELINE_H
 
 #include "graph/base/log.h"
 #include "graph/model/pass.h"
+#include "graph/model/registry.h"
 #include "graph/model/value.h"
 
 #ifdef __cplusplus
@@ -40,39 +42,49 @@ typedef struct rl_output {
     size_t n_layers;
     const char *file; /* pattern, relative to --out */
     rl_where file_where;
-    const char *colorspace;           /* or NULL */
+    const char *colorspace;            /* or NULL */
     const char *display, *view, *look; /* or NULL */
     rl_where color_where;
-    double exposure;         /* stops */
-    rl_pixel_type type;      /* given, or the file type's default: half for EXR, uint8 for PNG and JPEG, … */
-    const char *compression; /* EXR: lower case name, default "zip"; TIFF: none|lzw|zip; NULL = the writer's default */
+    double exposure;    /* stops */
+    rl_pixel_type type; /* given, or the file type's default: half for EXR, uint8 for PNG and JPEG, … */
+    const char *compression; /* EXR: lower case name, default "zip"; TIFF: none|lzw|zip; NULL = the writer's
+                                default */
     double quality;          /* JPEG 1…100, DWA level; < 0 = default */
     int level;               /* zip level, 0 = default */
 } rl_output;
 
+/* Constant after rl_pipeline_parse. Lives in the arena that was given, and points into the tree: both must
+ * outlive it. */
 typedef struct rl_pipeline {
-    const char *file; /* as given on the command line */
-    const char *name; /* file name without folder and extension */
-    unsigned long long hash; /* of the merged content (include and --set applied): relit:pipeline */
+    const char *file;        /* as given on the command line */
+    const char *name;        /* file name without folder and extension */
+    unsigned long long hash; /* XXH3 of the merged content (includes, --set) and of user kernels' files */
     const rl_value *root;    /* merged; the parts below point into it */
     const rl_value *capture; /* a path (text) or an inline manifest (map); NULL = must come from --capture */
     const char *ocio_config; /* path resolved against the file that names it, or NULL */
     const char *working;     /* working colour space, or NULL: the config's scene_linear role */
     rl_where color_where;
     const rl_value *profiles, *shading, *materials; /* maps or NULL, see materials.h */
-    const rl_value *lights;  /* map, or NULL: the capture's own */
-    const rl_node *nodes;    /* in the order of the file */
+    const rl_value *lights;                         /* map, or NULL: the capture's own */
+    const rl_node *nodes;                           /* in the order of the file */
     size_t n_nodes;
     const rl_output *outputs;
     size_t n_outputs;
 } rl_pipeline;
 
-/* Parses a merged tree. User kernels (`pass: kernel`) become descriptors in the arena; their .cl file is read here.
- * Unknown keys, passes, parameters, ports: an error with the nearest name. Does not look at image names (graph.h). */
+/* Parses a merged tree. User kernels (`pass: kernel`) become descriptors in the arena; their .cl file is read
+ * here. Unknown keys, passes, parameters, ports: an error with the nearest name. Does not look at image names
+ * (graph.h). */
 rl_code rl_pipeline_parse(rl_arena *arena, const char *file, rl_value *root, const rl_log *log,
                           const rl_pipeline **out, rl_error *err);
 
-/* Expands {capture}, {frame:04}, {variant} and such in an output's file pattern; unknown names are an error. */
+/* The same with other passes than the build's. */
+rl_code rl_pipeline_parse_from(const rl_registry *registry, rl_arena *arena, const char *file, rl_value *root,
+                               const rl_log *log, const rl_pipeline **out, rl_error *err);
+
+/* Expands {capture}, {frame:04}, {variant} and such in an output's file pattern; unknown names are an error.
+ * {frame} is printf's %lld, {frame:04} %04lld. capture and variant may be NULL where there is none: a pattern
+ * that asks for it is an error. */
 rl_code rl_output_path(rl_arena *arena, const rl_output *output, const char *capture, long long frame,
                        const char *variant, const char **out, rl_error *err);
 

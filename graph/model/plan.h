@@ -18,7 +18,7 @@ typedef struct rl_geometry {
     int stride4, plane4;
 } rl_geometry;
 
-/* RL_E_MEMORY when the sizes do not fit an int. */
+/* RL_E_MEMORY when the sizes do not fit an int, RL_E_FORMAT when the window is empty. */
 rl_code rl_geometry_make(int x, int y, int width, int height, rl_geometry *out, rl_error *err);
 
 typedef enum rl_buffer_class {
@@ -36,7 +36,8 @@ typedef struct rl_buffer {
     int planes;
     rl_buffer_class kind;
     int slot;        /* TRANSIENT: the slot that it lives in; else -1 */
-    int first, last; /* steps, inclusive, during which it holds something; SOURCE: first = -1; SINK: last = n_steps */
+    int first, last; /* steps, inclusive, during which it holds something; SOURCE: first = -1; SINK, and a SOURCE that
+                        the writer reads: last = n_steps; HISTORY: both */
 } rl_buffer;
 
 typedef enum rl_step_kind {
@@ -59,8 +60,10 @@ typedef struct rl_plan_node {
     const int *buffers; /* a port: the buffer, or -1 */
 } rl_plan_node;
 
-/* A HISTORY port's buffer in `buffers` is the pair's; the executor binds its older half. For the history of a capture
- * layer the pair's younger half is filled by a COPY step at the end of the plan. */
+/* A HISTORY port's buffer in `buffers` is the pair's; the executor binds its older half. Every other use of such a
+ * buffer (ports that read or write it, CONVERT, COPY) means the younger half. An image of a node whose past is read, by
+ * that node or by another, lives in the pair itself. A capture layer's past is a pair of its own, whose younger half is
+ * filled by a COPY step at the end of the plan, or by a CONVERT step when the past is wanted in another layout. */
 typedef struct rl_plan {
     const rl_graph *graph;
     const rl_buffer *buffers;
@@ -76,18 +79,26 @@ typedef struct rl_plan {
     size_t n_culled;
 } rl_plan;
 
+/* Only memory can fail. */
 rl_code rl_plan_make(rl_arena *arena, const rl_graph *graph, const rl_plan **out, rl_error *err);
+
+/* RL_E_MEMORY when a buffer has more samples than the kernels' int can index: many shadow planes at a large size. */
+rl_code rl_plan_fits(const rl_plan *plan, const rl_geometry *g, rl_error *err);
 
 /* Bytes of one copy of a buffer, guards included. */
 size_t rl_buffer_bytes(const rl_buffer *buffer, const rl_geometry *g);
+/* How many copies exist at once: a SOURCE or SINK for each frame in flight, both halves of a pair, else 1. */
+size_t rl_buffer_copies(const rl_buffer *buffer, int in_flight);
 /* Bytes of a slot: the largest buffer that lives in it. */
 size_t rl_slot_bytes(const rl_plan *plan, int slot, const rl_geometry *g);
-/* Device memory for `in_flight` frames, and what it would be if no buffer shared a slot. */
+/* These saturate at SIZE_MAX. Device memory for `in_flight` frames, and what it would be if no buffer shared a slot. */
 size_t rl_plan_bytes(const rl_plan *plan, const rl_geometry *g, int in_flight);
 size_t rl_plan_bytes_unshared(const rl_plan *plan, const rl_geometry *g, int in_flight);
 
 /* `relit plan` (plan_print.c, plan_dot.c): text for people, graphviz, JSON. g may be NULL: no bytes. */
 struct rl_str; /* graph/base/text.h */
+const char *rl_layout_name(rl_layout layout);           /* "linear", "phase4" */
+const char *rl_buffer_class_name(rl_buffer_class kind); /* "source", "transient", "sink", "history" */
 void rl_plan_print_text(const rl_plan *plan, const rl_geometry *g, int in_flight, struct rl_str *out);
 void rl_plan_print_dot(const rl_plan *plan, const rl_geometry *g, int in_flight, struct rl_str *out);
 rl_code rl_plan_print_json(const rl_plan *plan, const rl_geometry *g, int in_flight, struct rl_str *out, rl_error *err);

@@ -1,0 +1,77 @@
+/* Lights as pipelines and manifests write them, and what they are in SI radiometry.
+ *
+ *     key: {type: point, position: [x, y, z], intensity: [r, g, b]}                       W/sr
+ *     top: {type: spot, position: …, direction: […], angle: 40, blend: 0.2, candela: 900} full angle, degrees
+ *     sun: {type: directional, direction: […], irradiance: 3, color: [1, 0.9, 0.8]}       W/m²
+ *
+ * Photometric keys, at `efficacy` lm/W (683 unless given): candela and lumen for point and spot, lux for
+ * directional. Every amount is one number or three; `color` multiplies it, `exposure` (stops) too. */
+#ifndef RL_MODEL_LIGHTS_H
+#define RL_MODEL_LIGHTS_H
+
+#include <stdbool.h>
+#include <stddef.h>
+
+#include "graph/base/arena.h"
+#include "graph/base/error.h"
+#include "graph/model/value.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef enum rl_light_type { RL_LIGHT_POINT, RL_LIGHT_SPOT, RL_LIGHT_DIRECTIONAL } rl_light_type;
+typedef enum rl_light_unit {
+    RL_LIGHT_INTENSITY,  /* W/sr */
+    RL_LIGHT_IRRADIANCE, /* W/m² on a surface that faces the light */
+    RL_LIGHT_CANDELA,    /* lm/sr */
+    RL_LIGHT_LUMEN,
+    RL_LIGHT_LUX, /* lm/m² */
+} rl_light_unit;
+typedef enum rl_shadow { RL_SHADOW_LAYER, RL_SHADOW_SCREEN, RL_SHADOW_NONE } rl_shadow;
+
+/* As written, with the defaults filled in. Texts live in the arena. */
+typedef struct rl_light_spec {
+    const char *name;
+    rl_where where; /* of the name */
+    rl_light_type type;
+    bool enabled;         /* default true */
+    bool in_camera_space; /* position and direction: `space: camera`, else world */
+    double position_m[3]; /* metres; point, spot */
+    double direction[3];  /* unit, the way the light travels; spot, directional */
+    double angle;         /* spot: full angle, radians, 0 < angle < pi */
+    double blend;         /* spot: 0 hard … 1 soft from the axis on */
+    rl_light_unit unit;
+    double amount[3];       /* in `unit`, times color; r, g, b; >= 0 */
+    double efficacy;        /* lm/W, > 0 */
+    double exposure;        /* stops */
+    const char *colorspace; /* of the amounts; default "lin_rec709" */
+    rl_shadow shadow;
+    const char *shadow_layer; /* RL_SHADOW_LAYER: the L of shadow.L */
+    bool shadow_named;        /* false: it is the default, the light's own name, and may be absent */
+} rl_light_spec;
+
+typedef struct rl_lights {
+    rl_light_spec *light; /* in the order of the file */
+    size_t n;
+} rl_lights;
+
+/* A map of lights. `metres` is the length of one unit of `position`. */
+rl_code rl_lights_parse(rl_arena *arena, const rl_value *v, double metres, rl_lights *out, rl_error *err);
+
+/* What the kernels see, but in the light's own colour space: W/sr for point and spot, W/m² for directional,
+ * exposure applied.
+ *     candela: I = Iv/efficacy     lux: E = Ev/efficacy
+ *     lumen, point: I = F/(4·pi·efficacy)
+ *     lumen, spot:  I = F/(omega·efficacy), omega = 2·pi·(1 - cos(angle/2)): the flux that the cone would
+ * send with a hard edge. With `blend` the soft rim lies inside the cone and the light sends less. */
+void rl_light_resolve(const rl_light_spec *spec, double out[3]);
+
+/* Cosines of the half angles between which a spot falls from 1 to 0: the inner half angle is (1 - blend)
+ * times the outer one. */
+void rl_light_cone(const rl_light_spec *spec, double *cos_inner, double *cos_outer);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,321 @@
+#include "graph/model/params.h"
+
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+rl_code rl_fail_suggest(rl_error *err, rl_where where, const char *text, const char *name,
+                        const char *const *known, size_t n)
+{
+    rl_str more = {0};
+    rl_suggest(&more, name, known, n, "known");
+    rl_code code = !text || more.failed ? rl_fail_memory(err, more.length)
+                                        : rl_fail(err, RL_E_CONFIG, where, "%s%s", text, rl_str_text(&more));
+    rl_str_free(&more);
+    return code;
+}
+
+/* ---- words
+ * -------------------------------------------------------------------------------------------------- */
+
+/* Appends word `index` of "a|b|c"; false when there is none. */
+static bool add_word(rl_str *s, const char *words, int index)
+{
+    for (; words && index > 0; index--) {
+        words = strchr(words, '|');
+        words = words ? words + 1 : NULL;
+    }
+    if (!words || index < 0)
+        return false;
+    rl_str_addn(s, words, strcspn(words, "|"));
+    return true;
+}
+
+/* The index of `text` among "a|b|c", or -1. */
+static int find_word(const char *words, const char *text)
+{
+    size_t n = strlen(text);
+    for (int i = 0; n && words; i++) {
+        if (strcspn(words, "|") == n && !strncmp(words, text, n))
+            return i;
+        words = strchr(words, '|');
+        words = words ? words + 1 : NULL;
+    }
+    return -1;
+}
+
+/* ---- ranges as text
+ * ------------------------------------------------------------------------------------------ */
+
+/* "0 … 1", "≥ 0", "≤ 1", or nothing: limits that the type has anyway are not worth a word. */
+static void add_range(const rl_param *row, rl_str *s)
+{
+    double least = row->type == RL_I32 ? (double)INT32_MIN : (double)-FLT_MAX;
+    double most = row->type == RL_I32 ? (double)INT32_MAX : (double)FLT_MAX;
+    char min[32], max[32];
+    rl_format_double(row->min, min);
+    rl_format_double(row->max, max);
+    if (row->min > least && row->max < most)
+        rl_str_printf(s, "%s … %s", min, max);
+    else if (row->min > least)
+        rl_str_printf(s, "≥ %s", min);
+    else if (row->max < most)
+        rl_str_printf(s, "≤ %s", max);
+}
+
+static void add_expected(const rl_param *row, rl_str *s)
+{
+    if (row->type == RL_I32 && row->words)
+        rl_str_printf(s, "%s or ", row->words);
+    rl_str_add(s, row->type == RL_I32    ? "an integer"
+                  : row->type == RL_RGBF ? "a number or a list of three, each"
+                                         : "a number");
+    size_t before = s->length;
+    rl_str_add(s, " ");
+    add_range(row, s);
+    if (s->length == before + 1 && s->text)
+        s->text[s->length = before] = 0;
+    if (row->unit && row->unit[0])
+        rl_str_printf(s, " (%s)", row->unit);
+}
+
+/* ---- reading
+ * ------------------------------------------------------------------------------------------------- */
+
+static void store_int(void *out, double value)
+{
+    int32_t v = (int32_t)value;
+    memcpy(out, &v, sizeof v);
+}
+
+static void store_float(void *out, size_t i, double value)
+{
+    float v = (float)value;
+    memcpy((char *)out + i * sizeof v, &v, sizeof v);
+}
+
+void rl_param_default(const rl_param *row, void *out)
+{
+    if (row->type == RL_RGBF) {
+        for (size_t i = 0; i < 3; i++)
+            store_float(out, i, row->no_default ? -1 : row->def[i]);
+    } else if (row->type == RL_F32) {
+        store_float(out, 0, row->no_default ? -1 : row->def[0]);
+    } else {
+        store_int(out, row->no_default ? -1 : row->def[0]);
+    }
+}
+
+static rl_code wrong(const rl_param *row, const rl_value *v, rl_error *err)
+{
+    rl_str expected = {0};
+    add_expected(row, &expected);
+    rl_code code = expected.failed ? rl_fail_memory(err, expected.length)
+                                   : rl_value_wrong(v, row->name, rl_str_text(&expected), err);
+    rl_str_free(&expected);
+    return code;
+}
+
+/* The comparisons are false for NaN. */
+static bool fits(const rl_param *row, const rl_value *v)
+{
+    return v->kind == RL_NUMBER && v->number >= row->min && v->number <= row->max &&
+           fabs(v->number) <= FLT_MAX;
+}
+
+static rl_code read_int(const rl_param *row, const rl_value *v, void *out, rl_error *err)
+{
+    int word = v->kind == RL_TEXT && row->words ? find_word(row->words, v->text) : -1;
+    if (word < 0 && (!fits(row, v) || v->number != floor(v->number) || fabs(v->number) > INT32_MAX))
+        return wrong(row, v, err);
+    store_int(out, word >= 0 ? -1.0 - word : v->number);
+    return RL_OK;
+}
+
+static rl_code read_rgb(const rl_param *row, const rl_value *v, void *out, rl_error *err)
+{
+    if (v->kind == RL_LIST && v->n != 3)
+        return wrong(row, v, err);
+    for (size_t i = 0; i < 3; i++) {
+        const rl_value *channel = v->kind == RL_LIST ? v->items[i] : v;
+        if (!fits(row, channel))
+            return wrong(row, channel, err);
+        store_float(out, i, channel->number);
+    }
+    return RL_OK;
+}
+
+rl_code rl_param_read(const rl_param *row, const rl_value *v, void *out, rl_error *err)
+{
+    rl_code code = RL_OK;
+    bool truth = false;
+    int word = 0;
+    switch (row->type) {
+    case RL_F32:
+        if (!fits(row, v))
+            return wrong(row, v, err);
+        store_float(out, 0, v->number);
+        break;
+    case RL_I32:
+        code = read_int(row, v, out, err);
+        break;
+    case RL_RGBF:
+        code = read_rgb(row, v, out, err);
+        break;
+    case RL_BOOL:
+        code = rl_value_truth(v, row->name, &truth, err);
+        if (!code)
+            store_int(out, truth);
+        break;
+    case RL_ENUM:
+        code = rl_value_word(v, row->name, row->words, &word, err);
+        if (!code)
+            store_int(out, word);
+        break;
+    }
+    return code;
+}
+
+static bool is_among(const char *const *names, size_t n, const char *name)
+{
+    for (size_t i = 0; i < n; i++)
+        if (!strcmp(names[i], name))
+            return true;
+    return false;
+}
+
+static rl_code unknown_key(rl_arena *arena, const rl_pass *pass, const char *node, const rl_entry *entry,
+                           const char *const *also, size_t n_also, rl_error *err)
+{
+    size_t n = pass->params.n;
+    const char **names = rl_arena_array(arena, n + 1, sizeof *names);
+    if (!names)
+        return rl_fail_memory(err, n * sizeof *names);
+    for (size_t i = 0; i < n; i++)
+        names[i] = pass->params.rows[i].name;
+    char *text = rl_arena_printf(arena, "pass '%s' (%s) has no parameter '%s'", node, pass->name, entry->key);
+    /* A slip in `in` or `pass` gets its hint too, but only parameters are listed. */
+    const char *other = rl_nearest(entry->key, names, n) ? NULL : rl_nearest(entry->key, also, n_also);
+    if (text && other)
+        text = rl_arena_printf(arena, "%s; did you mean '%s'?", text, other);
+    else if (text && !n)
+        text = rl_arena_printf(arena, "%s; it has none", text);
+    return rl_fail_suggest(err, entry->where, text, entry->key, names, other ? 0 : n);
+}
+
+static const rl_param *find_row(rl_params params, const char *name)
+{
+    for (size_t i = 0; i < params.n; i++)
+        if (!strcmp(params.rows[i].name, name))
+            return &params.rows[i];
+    return NULL;
+}
+
+rl_code rl_params_read(rl_arena *arena, const rl_pass *pass, const char *node, const rl_value *map,
+                       const char *const *also, size_t n_also, const void **out, rl_error *err)
+{
+    char *data = rl_arena_alloc(arena, pass->params_size);
+    if (!data)
+        return rl_fail_memory(err, pass->params_size);
+    for (size_t i = 0; i < pass->params.n; i++)
+        rl_param_default(&pass->params.rows[i], data + pass->params.rows[i].offset);
+    if (map && map->kind != RL_MAP)
+        return rl_value_wrong(map, node, "a map", err);
+    for (size_t i = 0; map && i < map->n; i++) {
+        const rl_entry *entry = &map->entries[i];
+        if (is_among(also, n_also, entry->key))
+            continue;
+        const rl_param *row = find_row(pass->params, entry->key);
+        rl_code code = row ? rl_param_read(row, entry->value, data + row->offset, err)
+                           : unknown_key(arena, pass, node, entry, also, n_also, err);
+        if (code)
+            return code;
+    }
+    *out = data;
+    return RL_OK;
+}
+
+/* ---- telling
+ * ------------------------------------------------------------------------------------------------- */
+
+static float load_float(const void *value, size_t i)
+{
+    float v;
+    memcpy(&v, (const char *)value + i * sizeof v, sizeof v);
+    return v;
+}
+
+void rl_param_print(const rl_param *row, const void *value, rl_str *s)
+{
+    char text[3][32];
+    int32_t v;
+    memcpy(&v, value, sizeof v);
+    switch (row->type) {
+    case RL_F32:
+        rl_str_add(s, rl_format_float(load_float(value, 0), text[0]));
+        break;
+    case RL_RGBF:
+        for (size_t i = 0; i < 3; i++)
+            rl_format_float(load_float(value, i), text[i]);
+        rl_str_printf(s, "[%s, %s, %s]", text[0], text[1], text[2]);
+        break;
+    case RL_BOOL:
+        rl_str_add(s, v ? "true" : "false");
+        break;
+    case RL_ENUM:
+        add_word(s, row->words, v);
+        break;
+    case RL_I32:
+        if (v >= 0 || !add_word(s, row->words, -1 - v))
+            rl_str_printf(s, "%d", (int)v);
+        break;
+    }
+}
+
+void rl_param_describe(const rl_param *row, rl_str *s)
+{
+    float value[3];
+    const char *unit = row->unit && row->unit[0] ? row->unit : NULL;
+    size_t before = s->length;
+    if (row->type == RL_BOOL)
+        rl_str_add(s, "true|false");
+    else if (row->words)
+        rl_str_add(s, row->words);
+    if (row->type != RL_BOOL && row->type != RL_ENUM) {
+        if (s->length > before)
+            rl_str_add(s, "|");
+        size_t words = s->length;
+        add_range(row, s);
+        if (s->length == words)
+            rl_str_add(s, row->type == RL_I32 ? "an integer" : "a number");
+    }
+    if (row->no_default || row->required) {
+        rl_str_printf(s, "%s%s, %s", unit ? " " : "", unit ? unit : "",
+                      row->required ? "required" : "no default");
+        return;
+    }
+    rl_str_add(s, ", default ");
+    rl_param_default(row, value);
+    rl_param_print(row, value, s);
+    if (unit)
+        rl_str_printf(s, " %s", unit);
+}
+
+void rl_param_field(const rl_param *row, const char *prefix, rl_str *s)
+{
+    bool real = row->type == RL_F32 || row->type == RL_RGBF;
+    rl_str_printf(s, "%s %s%s%s;", real ? "float" : "int", prefix, row->name,
+                  row->type == RL_RGBF ? "[3]" : "");
+}
+
+void rl_params_struct_text(rl_params params, const char *name, rl_str *s)
+{
+    if (!params.n)
+        return;
+    rl_str_printf(s, "typedef struct %s {", name);
+    for (size_t i = 0; i < params.n; i++) {
+        rl_str_add(s, " ");
+        rl_param_field(&params.rows[i], "", s);
+    }
+    rl_str_printf(s, " } %s;\n", name);
+}

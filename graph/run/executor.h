@@ -1,0 +1,57 @@
+/* Runs a plan on a device, frame by frame. One thread at a time. */
+#ifndef RL_RUN_EXECUTOR_H
+#define RL_RUN_EXECUTOR_H
+
+#include "graph/base/log.h"
+#include "graph/model/materials.h"
+#include "graph/model/plan.h"
+#include "graph/run/device.h"
+#include "kernels/shared.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct rl_executor rl_executor;
+
+/* The buffers that belong to one frame in flight: what its source fills and what its writers read. */
+typedef struct rl_frame_buffers rl_frame_buffers;
+
+/* Builds the programs of all live nodes, on up to `threads` threads. Keeps pointers to all arguments. */
+rl_code rl_executor_new(rl_device *device, const rl_plan *plan, const rl_materials *materials, int threads,
+                        const rl_log *log, rl_executor **out, rl_error *err);
+void rl_executor_free(rl_executor **executor);
+
+/* Allocates slots and history for frames of this size (nothing happens when it is the size already); history
+ * is then empty. Frame buffers of another size must have been freed. */
+rl_code rl_executor_resize(rl_executor *executor, const rl_geometry *geometry, rl_error *err);
+const rl_geometry *rl_executor_geometry(const rl_executor *executor);
+
+/* May be called while another thread runs a frame. */
+rl_code rl_frame_buffers_new(rl_executor *executor, const rl_geometry *geometry, rl_frame_buffers **out,
+                             rl_error *err);
+void rl_frame_buffers_free(rl_frame_buffers **buffers);
+/* The memory of a SOURCE or SINK buffer of the plan; NULL for others. */
+rl_memory *rl_frame_buffers_memory(const rl_frame_buffers *buffers, int buffer);
+
+/* What changes from frame to frame, besides pixels. The executor fills sizes, history and the previous
+ * camera. */
+typedef struct rl_frame_values {
+    int number;
+    camera_t camera;
+    const light_t *lights;
+    int n_lights; /* at most what it was for the first frame, or any number for it */
+} rl_frame_values;
+
+/* Runs all steps and waits for them; then history swaps. On an error history is empty afterwards. `spans` may
+ * be NULL, else gets plan->n_steps entries. */
+rl_code rl_executor_run(rl_executor *executor, rl_frame_buffers *buffers, const rl_frame_values *values,
+                        rl_span *spans, rl_error *err);
+
+/* Forgets history: a cut. */
+void rl_executor_cut(rl_executor *executor);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

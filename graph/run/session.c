@@ -1,0 +1,190 @@
+/* Opening and closing a session, and looking at it. */
+#include "graph/run/session.h"
+
+#include <string.h>
+#include <unistd.h>
+
+#include "graph/base/alloc.h"
+#include "graph/base/file.h"
+
+enum { IN_FLIGHT = 3 }; /* one loads, one runs, one is written */
+
+static rl_code apply_settings(rl_session *s, rl_value **root, rl_error *err)
+{
+    rl_code code = RL_OK;
+    for (size_t i = 0; i < s->options.n_settings && !code; i++) {
+        const rl_setting *set = &s->options.settings[i];
+        const char *name = rl_arena_printf(&s->arena, "--set %s=%s", set->path, set->value);
+        rl_value *v = NULL;
+        if (!name)
+            return rl_fail_memory(err, strlen(set->path));
+        code = rl_yaml_parse(&s->arena, set->value, strlen(set->value), name, &v, err);
+        if (!code)
+            code = rl_value_set(&s->arena, root, set->path, v, err);
+    }
+    return code;
+}
+
+static rl_code read_pipeline(rl_session *s, rl_error *err)
+{
+    const rl_options *o = &s->options;
+    rl_value *root = NULL;
+    rl_code code;
+    if (o->pipeline_text)
+        code = rl_yaml_parse(&s->arena, o->pipeline_text, strlen(o->pipeline_text), "pipeline", &root, err);
+    else if (o->pipeline)
+        code = rl_config_load(&s->arena, o->pipeline, &root, err);
+    else
+        code = rl_fail(err, RL_E_USAGE, RL_NOWHERE, "no pipeline was given");
+    if (!code)
+        code = apply_settings(s, &root, err);
+    return code ? code : rl_pipeline_parse(&s->arena, o->pipeline ? o->pipeline : "pipeline", root, s->log, &s->pipeline, err);
+}
+
+/* Frames and captures that expand to one file would overwrite each other. Names differ by capture and number only, so it is
+ * enough to compare the first frames of all captures and two frames of each. */
+static rl_code check_files(rl_session *s, rl_error *err)
+{
+    for (size_t i = 0; i < s->n_outputs; i++) {
+        const rl_output *o = s->outputs[i].spec;
+        for (size_t a = 0; a < s->n_sequences; a++) {
+            const rl_sequence *q = &s->sequences[a];
+            const char *first = NULL, *second = NULL;
+            rl_code code = rl_output_path(&s->arena, o, q->manifest->name, q->frames.numbers[0], NULL, &first, err);
+            if (!code && q->frames.n > 1)
+                code = rl_output_path(&s->arena, o, q->manifest->name, q->frames.numbers[1], NULL, &second, err);
+            if (code)
+                return code;
+            if (second && !strcmp(first, second))
+                return rl_fail(err, RL_E_CONFIG, o->file_where,
+                               "output '%s': all frames would be written to '%s'; put {frame:04} into 'file'", o->name, first);
+            for (size_t b = 0; b < a; b++)
+                if (!strcmp(s->sequences[b].manifest->name, q->manifest->name))
+                    return rl_fail(err, RL_E_CONFIG, q->manifest->where,
+                                   "two captures are named '%s' and would write the same files; give one another 'name'",
+                                   q->manifest->name);
+        }
+    }
+    return RL_OK;
+}
+
+static rl_code check_memory(rl_session *s, rl_error *err)
+{
+    for (size_t i = 0; i < s->n_sequences; i++) {
+        const rl_sequence *q = &s->sequences[i];
+        rl_code code = q->geometry.columns ? rl_plan_fits(q->plan, &q->geometry, err) : RL_OK;
+        if (code)
+            return code;
+        size_t one = q->geometry.columns ? rl_plan_bytes(q->plan, &q->geometry, 1) : 0;
+        char need[32], limit[32];
+        if (s->options.memory_limit && one > s->options.memory_limit)
+            return rl_fail(err, RL_E_MEMORY, q->manifest->where,
+                           "one frame of %d x %d needs %s, more than --memory-limit %s", q->geometry.width,
+                           q->geometry.height, rl_format_bytes(one, need),
+                           rl_format_bytes(s->options.memory_limit, limit));
+    }
+    return RL_OK;
+}
+
+rl_code rl_session_open(const rl_options *options, rl_session **out, rl_error *err)
+{
+    rl_error local = {0};
+    err = err ? err : &local;
+    *out = NULL;
+    rl_session *s = rl_calloc(1, sizeof *s);
+    if (!s)
+        return rl_fail_memory(err, sizeof *s);
+    s->options = *options;
+    s->log = options->log;
+    long cpus = sysconf(_SC_NPROCESSORS_ONLN);
+    s->threads = options->threads > 0 ? options->threads : cpus > 0 ? (int)cpus : 1;
+    rl_code code = rl_pool_new(s->threads, &s->pool, err);
+    if (!code)
+        code = read_pipeline(s, err);
+    if (!code)
+        code = rl_session_colors(s, err);
+    if (!code)
+        code = rl_session_sequences(s, err);
+    if (!code)
+        code = check_files(s, err);
+    if (!code)
+        code = check_memory(s, err);
+    if (code)
+        rl_session_close(&s);
+    *out = s;
+    return code;
+}
+
+void rl_session_close(rl_session **session)
+{
+    rl_session *s = *session;
+    *session = NULL;
+    if (!s)
+        return;
+    rl_frame_free(&s->frame);
+    for (size_t i = 0; i < s->n_sequences; i++)
+        rl_sequence_close(&s->sequences[i]);
+    rl_device_close(&s->device);
+    rl_ocio_free(&s->ocio);
+    rl_pool_free(&s->pool);
+    rl_arena_free(&s->arena);
+    rl_free(s);
+}
+
+rl_code rl_session_prepare(rl_session *s, rl_error *err)
+{
+    rl_code code = s->device ? RL_OK : rl_device_open(s->options.device, s->options.threads, s->log, &s->device, err);
+    for (size_t i = 0; i < s->n_sequences && !code; i++)
+        if (!s->sequences[i].executor)
+            code = rl_executor_new(s->device, s->sequences[i].plan, s->sequences[i].materials, s->threads, s->log,
+                                   &s->sequences[i].executor, err);
+    return code;
+}
+
+size_t rl_session_captures(const rl_session *s)
+{
+    return s->n_sequences;
+}
+
+const char *rl_session_capture_name(const rl_session *s, size_t capture)
+{
+    return capture < s->n_sequences ? s->sequences[capture].manifest->name : NULL;
+}
+
+size_t rl_session_frames(const rl_session *s, size_t capture)
+{
+    return capture < s->n_sequences ? s->sequences[capture].frames.n : 0;
+}
+
+long long rl_session_frame(const rl_session *s, size_t capture, size_t i)
+{
+    return s->sequences[capture].frames.numbers[i];
+}
+
+rl_code rl_session_plan(const rl_session *s, size_t capture, rl_plan_format format, char **text, rl_error *err)
+{
+    *text = NULL;
+    if (capture >= s->n_sequences)
+        return rl_fail(err, RL_E_USAGE, RL_NOWHERE, "there is no capture %zu", capture);
+    const rl_sequence *q = &s->sequences[capture];
+    const rl_geometry *g = q->geometry.columns ? &q->geometry : NULL;
+    rl_str out = {0};
+    rl_code code = RL_OK;
+    if (format == RL_PLAN_TEXT)
+        rl_plan_print_text(q->plan, g, IN_FLIGHT, &out);
+    else if (format == RL_PLAN_DOT)
+        rl_plan_print_dot(q->plan, g, IN_FLIGHT, &out);
+    else
+        code = rl_plan_print_json(q->plan, g, IN_FLIGHT, &out, err);
+    if (!code && out.failed)
+        code = rl_fail_memory(err, out.length);
+    if (code)
+        rl_str_free(&out);
+    *text = out.text;
+    return code;
+}
+
+void rl_text_free(char *text)
+{
+    rl_free(text);
+}

@@ -1,0 +1,89 @@
+/* Inside of a session: what relit.h's functions share. Not installed. */
+#ifndef RL_RUN_SESSION_H
+#define RL_RUN_SESSION_H
+
+#include "graph/base/arena.h"
+#include "graph/base/pool.h"
+#include "graph/model/manifest.h"
+#include "graph/model/materials.h"
+#include "graph/model/pipeline.h"
+#include "graph/model/plan.h"
+#include "graph/relit.h"
+#include "graph/run/color.h"
+#include "graph/run/executor.h"
+#include "graph/run/reader.h"
+#include "graph/run/sink.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* A light that shines. */
+typedef struct rl_active_light {
+    const rl_light_spec *spec;
+    const rl_layer *shadow, *thickness; /* the capture's layers for it, or NULL */
+    int shadow_plane, thickness_plane;  /* of the ports, or -1 */
+    float to_working[9];                /* from the colour space of its amounts, rows listed */
+} rl_active_light;
+
+/* One capture with all that depends on it. Constant after rl_session_open, except for the executor. */
+typedef struct rl_sequence {
+    rl_manifest *manifest;
+    rl_frames frames; /* to be processed, in order */
+    rl_active_light *lights;
+    size_t n_lights;
+    light_t *light_values; /* of the frame that runs */
+    rl_light_planes shadow, thickness;
+    const rl_materials *materials;
+    const rl_graph *graph;
+    const rl_plan *plan;
+    rl_geometry geometry; /* of the first frame */
+    rl_reader *reader;
+    rl_executor *executor; /* NULL until prepared */
+} rl_sequence;
+
+struct rl_session {
+    rl_arena arena;
+    rl_options options;
+    int threads;
+    const rl_log *log;
+    const rl_pipeline *pipeline;
+    rl_ocio *ocio;
+    const char *working;
+    rl_pool *pool;
+    rl_device *device;
+    rl_sink_output *outputs; /* the pipeline's that are wanted, then one for each dump */
+    rl_wanted *wanted;       /* the same, then a hidden one for depth and stencil */
+    size_t n_outputs;
+    rl_sequence *sequences;
+    size_t n_sequences;
+    /* rl_session_process: its one frame */
+    rl_frame frame;
+    rl_sequence *frame_sequence; /* NULL: none yet */
+    bool processed;
+};
+
+/* session_color.c: opens the OCIO config, checks every colour name, makes the passes of the outputs. */
+rl_code rl_session_colors(rl_session *session, rl_error *err);
+/* The matrix from a linear colour space (named at `where`) to the working space. */
+rl_code rl_session_light_matrix(const rl_session *session, const char *space, rl_where where, float m[9],
+                                rl_error *err);
+
+/* session_lights.c: the active lights of a capture; what the kernels see of them at a frame. */
+rl_code rl_session_lights(rl_session *session, rl_sequence *sequence, rl_error *err);
+void rl_session_light_values(const rl_sequence *sequence, const camera_t *camera, light_t *out);
+
+/* session_capture.c: manifests, frames, materials, graph and plan of every capture. */
+rl_code rl_session_sequences(rl_session *session, rl_error *err);
+void rl_sequence_close(rl_sequence *sequence);
+
+/* session_run.c: runs the kernels on a loaded frame. `cut`: history does not reach here. */
+rl_code rl_session_execute(rl_session *session, rl_sequence *sequence, rl_frame *frame, bool cut, rl_error *err);
+/* Where the planes of a graph output's image are, mapped; unmap with the memory. */
+rl_code rl_session_map_image(const rl_sequence *sequence, const rl_frame *frame, int buffer, rl_sink_image *out,
+                             rl_memory **memory, rl_error *err);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,146 @@
+/* Lights of a session: which are active, which planes of the shadow layers they use, and what the kernels see of them. */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "graph/run/session.h"
+
+static const rl_light_spec *find_light(const rl_lights *lights, const char *name)
+{
+    for (size_t i = 0; i < lights->n; i++)
+        if (!strcmp(lights->light[i].name, name))
+            return &lights->light[i];
+    return NULL;
+}
+
+/* A shadow layer belongs to a place: where its light stood when the capture was recorded. */
+static void warn_stale(const rl_session *s, const rl_manifest *m, const rl_light_spec *light)
+{
+    const rl_light_spec *recorded = find_light(&m->lights, light->shadow_layer);
+    if (!recorded || recorded == light || light->type == RL_LIGHT_DIRECTIONAL || light->in_camera_space ||
+        recorded->type == RL_LIGHT_DIRECTIONAL || recorded->in_camera_space)
+        return;
+    double d2 = 0;
+    for (int i = 0; i < 3; i++) {
+        double d = light->position_m[i] - recorded->position_m[i];
+        d2 += d * d;
+    }
+    if (sqrt(d2) > 1e-3)
+        rl_report(s->log, RL_WARNING, light->where,
+                  "light '%s' stands %.3g m from where the layer 'shadow.%s' was recorded: its shadow is stale "
+                  "(shadow: none switches it off)",
+                  light->name, sqrt(d2), light->shadow_layer);
+}
+
+static const rl_layer *light_layer(const rl_manifest *m, const char *kind, const char *light)
+{
+    char name[256];
+    snprintf(name, sizeof name, "%s.%s", kind, light);
+    return rl_manifest_layer(m, name);
+}
+
+static rl_code no_such_shadow(const rl_manifest *m, const rl_light_spec *light, rl_error *err)
+{
+    rl_str text = {0};
+    const char *names[64];
+    size_t n = 0;
+    for (int i = 0; i < m->n_layers && n < 64; i++)
+        if (m->layers[i].id == RL_LAYER_SHADOW)
+            names[n++] = m->layers[i].light;
+    rl_suggest(&text, light->shadow_layer, names, n, "known");
+    rl_code code = rl_fail(err, RL_E_CONFIG, light->where, "light '%s': the capture '%s' has no layer 'shadow.%s'%s",
+                           light->name, m->name, light->shadow_layer, rl_str_text(&text));
+    rl_str_free(&text);
+    return code;
+}
+
+static rl_code bind_shadow(const rl_session *s, const rl_manifest *m, rl_active_light *a, rl_error *err)
+{
+    const rl_light_spec *light = a->spec;
+    if (light->shadow == RL_SHADOW_NONE)
+        return RL_OK;
+    if (light->shadow == RL_SHADOW_SCREEN)
+        return rl_fail(err, RL_E_CONFIG, light->where,
+                       "light '%s': 'shadow: screen' is not supported by this version; expected a layer's name or none",
+                       light->name);
+    a->shadow = light_layer(m, "shadow", light->shadow_layer);
+    a->thickness = light_layer(m, "shadow_thickness", light->shadow_layer);
+    if (!a->shadow && light->shadow_named)
+        return no_such_shadow(m, light, err);
+    if (a->shadow)
+        warn_stale(s, m, light);
+    return RL_OK;
+}
+
+rl_code rl_session_lights(rl_session *s, rl_sequence *q, rl_error *err)
+{
+    const rl_manifest *m = q->manifest;
+    rl_lights lights = m->lights;
+    rl_code code = RL_OK;
+    if (s->pipeline->lights)
+        code = rl_lights_parse(&s->arena, s->pipeline->lights, m->unit, &lights, err);
+    q->lights = rl_arena_array(&s->arena, lights.n + 1, sizeof *q->lights);
+    if (!code && !q->lights)
+        code = rl_fail_memory(err, lights.n * sizeof *q->lights);
+    const rl_layer **shadow = rl_arena_array(&s->arena, lights.n + 1, sizeof *shadow);
+    const rl_layer **thickness = rl_arena_array(&s->arena, lights.n + 1, sizeof *thickness);
+    q->light_values = rl_arena_array(&s->arena, lights.n + 1, sizeof *q->light_values);
+    if (!code && (!shadow || !thickness || !q->light_values))
+        code = rl_fail_memory(err, lights.n * sizeof *shadow);
+    q->shadow.layers = shadow;
+    q->thickness.layers = thickness;
+    for (size_t i = 0; i < lights.n && !code; i++) {
+        const rl_light_spec *spec = &lights.light[i];
+        if (!spec->enabled)
+            continue;
+        rl_active_light *a = &q->lights[q->n_lights++];
+        a->spec = spec;
+        a->shadow_plane = a->thickness_plane = -1;
+        code = bind_shadow(s, m, a, err);
+        if (!code)
+            code = rl_session_light_matrix(s, spec->colorspace, spec->where, a->to_working, err);
+        if (a->shadow)
+            shadow[a->shadow_plane = q->shadow.n++] = a->shadow;
+        if (a->thickness)
+            thickness[a->thickness_plane = q->thickness.n++] = a->thickness;
+    }
+    return code;
+}
+
+/* M * (p, w), M of 3 rows of 4. */
+static void transform(const float m[12], const double p[3], double w, float out[3])
+{
+    for (int i = 0; i < 3; i++)
+        out[i] = (float)((double)m[4 * i] * p[0] + (double)m[4 * i + 1] * p[1] + (double)m[4 * i + 2] * p[2] +
+                         (double)m[4 * i + 3] * w);
+}
+
+void rl_session_light_values(const rl_sequence *q, const camera_t *camera, light_t *out)
+{
+    for (size_t i = 0; i < q->n_lights; i++) {
+        const rl_active_light *a = &q->lights[i];
+        const rl_light_spec *spec = a->spec;
+        light_t l = {.shadow = a->shadow_plane, .shadow_thickness = a->thickness_plane};
+        l.type = spec->type == RL_LIGHT_POINT  ? LIGHT_POINT
+                 : spec->type == RL_LIGHT_SPOT ? LIGHT_SPOT
+                                               : LIGHT_DIRECTIONAL;
+        double radiometric[3], inner, outer;
+        rl_light_resolve(spec, radiometric);
+        rl_light_cone(spec, &inner, &outer);
+        for (int c = 0; c < 3; c++) {
+            double v = 0;
+            for (int k = 0; k < 3; k++)
+                v += (double)a->to_working[3 * c + k] * radiometric[k];
+            l.intensity[c] = (float)v;
+            l.position[c] = (float)spec->position_m[c];
+            l.direction[c] = (float)spec->direction[c];
+        }
+        l.cos_inner = (float)inner;
+        l.cos_outer = (float)outer;
+        if (spec->in_camera_space) {
+            transform(camera->to_world, spec->position_m, 1, l.position);
+            transform(camera->to_world, spec->direction, 0, l.direction);
+        }
+        out[i] = l;
+    }
+}

@@ -1,0 +1,220 @@
+#include "graph/run/sink.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#include "graph/base/alloc.h"
+#include "graph/base/arena.h"
+#include "graph/base/file.h"
+#include "graph/relit.h"
+#include "graph/run/sink_image.h"
+
+enum { MOST_CHANNELS = 256 };
+
+/* What of the source's header stays true of the result: cameras, time, what a studio put there. */
+static const char *const kept_attributes[] = {"camera:*",        "worldToCamera", "worldToNDC",  "timeCode",
+                                              "framesPerSecond", "capDate",       "utcOffset",   "longitude",
+                                              "latitude",        "altitude",      "focus",       "expTime",
+                                              "aperture",        "isoSpeed",      "owner",       "comments",
+                                              "reelName",        "imageCounter",  "cameraMake",  "cameraModel",
+                                              "cameraSerialNumber", "lensMake",   "lensModel",   "originalDataWindow",
+                                              "nominalFocalLength", "pinholeFocalLength", "effectiveFocalLength"};
+
+/* The part of the data window that is written, relative to it. */
+typedef struct region {
+    int x0, y0, width, height;
+    rl_exr_box window; /* the same in display-window pixels */
+} region;
+
+static rl_code crop_region(const rl_sink_frame *f, region *r, rl_error *err)
+{
+    rl_exr_box d = f->data_window, w = d;
+    if (f->crop) {
+        const int *c = f->crop;
+        w.x0 = c[0] > d.x0 ? c[0] : d.x0;
+        w.y0 = c[1] > d.y0 ? c[1] : d.y0;
+        w.x1 = c[0] + c[2] - 1 < d.x1 ? c[0] + c[2] - 1 : d.x1;
+        w.y1 = c[1] + c[3] - 1 < d.y1 ? c[1] + c[3] - 1 : d.y1;
+        if (w.x1 < w.x0 || w.y1 < w.y0)
+            return rl_fail(err, RL_E_DATA, RL_NOWHERE,
+                           "--crop %d,%d,%d,%d lies outside of the data window (%d, %d) - (%d, %d)", c[0], c[1], c[2],
+                           c[3], d.x0, d.y0, d.x1, d.y1);
+    }
+    *r = (region){.x0 = w.x0 - d.x0, .y0 = w.y0 - d.y0, .width = w.x1 - w.x0 + 1, .height = w.y1 - w.y0 + 1, .window = w};
+    return RL_OK;
+}
+
+/* Coverage: 1 where there is a material. */
+typedef struct coverage_job {
+    const rl_sink_frame *f;
+    const region *r;
+    float *out;
+} coverage_job;
+
+static void coverage_row(void *ctx, int y)
+{
+    const coverage_job *j = ctx;
+    const uint32_t *in = j->f->stencil + (size_t)(j->r->y0 + y) * j->f->stencil_stride + j->r->x0;
+    float *out = j->out + (size_t)y * (size_t)j->r->width;
+    for (int x = 0; x < j->r->width; x++)
+        out[x] = in[x] ? 1.0f : 0.0f;
+}
+
+static rl_code make_coverage(const rl_sink_frame *f, const region *r, rl_pool *pool, float **out, rl_error *err)
+{
+    size_t bytes = (size_t)r->width * (size_t)r->height * sizeof **out;
+    *out = rl_aligned(bytes);
+    if (!*out)
+        return rl_fail_memory(err, bytes);
+    coverage_job job = {f, r, *out};
+    rl_pool_for(pool, r->height, coverage_row, &job);
+    return RL_OK;
+}
+
+/* Channel letters of DESIGN 3: R G B (A), X Y Z, V, ID. */
+static const char *const *letters(rl_format format, int *n)
+{
+    static const char *const rgb[] = {"R", "G", "B"}, *const xyz[] = {"X", "Y", "Z"}, *const v[] = {"V"},
+                             *const id[] = {"ID"};
+    switch (format) {
+    case RL_RGB:
+        *n = 3;
+        return rgb;
+    case RL_NORMAL:
+        *n = 3;
+        return xyz;
+    case RL_VEC2:
+        *n = 2;
+        return xyz;
+    case RL_ID:
+        *n = 1;
+        return id;
+    default:
+        *n = 1;
+        return v;
+    }
+}
+
+typedef struct channel_list {
+    rl_exr_source rows[MOST_CHANNELS];
+    size_t n;
+    rl_arena names;
+    bool failed;
+} channel_list;
+
+static void add_channel(channel_list *list, const char *layer, const char *letter, rl_exr_source source)
+{
+    source.name = *layer ? rl_arena_printf(&list->names, "%s.%s", layer, letter) : rl_arena_strdup(&list->names, letter);
+    if (list->n == MOST_CHANNELS || !source.name) {
+        list->failed = true;
+        return;
+    }
+    list->rows[list->n++] = source;
+}
+
+static void add_image(channel_list *list, const rl_sink_image *image, rl_exr_pixel type, const region *r)
+{
+    int n;
+    const char *const *names = letters(image->format, &n);
+    size_t at = (size_t)r->y0 * image->stride + (size_t)r->x0;
+    for (int i = 0; i < image->planes; i++) {
+        const char *letter = i < n ? names[i] : rl_arena_printf(&list->names, "V%d", i);
+        rl_exr_source s = {.stride = image->stride, .type = type, .floats = image->plane[i] + at};
+        if (image->format == RL_ID) {
+            s.type = RL_EXR_UINT;
+            s.ids = (const uint32_t *)(const void *)s.floats;
+            s.floats = NULL;
+        }
+        add_channel(list, image->name, letter ? letter : "V", s);
+    }
+}
+
+/* An rgb image carries coverage as A: its own layer's, or the file's when several layers share it. */
+static void add_coverage(channel_list *list, const rl_sink_image *images, size_t n, const float *coverage, int width,
+                         rl_exr_pixel type)
+{
+    for (size_t i = 0; i < n; i++)
+        if (images[i].format == RL_RGB)
+            add_channel(list, images[i].name, "A",
+                        (rl_exr_source){.type = type, .floats = coverage, .stride = (size_t)width});
+}
+
+static size_t add_attributes(const rl_sink_output *o, const rl_sink_frame *f, rl_exr_attribute *attrs)
+{
+    size_t n = 0;
+    attrs[n++] = (rl_exr_attribute){"relit:version", {.type = RL_EXR_T_STRING, .text = RL_VERSION}};
+    attrs[n++] = (rl_exr_attribute){"relit:pipeline", {.type = RL_EXR_T_STRING, .text = f->pipeline}};
+    if (o->space)
+        attrs[n++] = (rl_exr_attribute){"relit:colorspace", {.type = RL_EXR_T_STRING, .text = o->space}};
+    if (o->primaries.known) {
+        rl_exr_value v = {.type = RL_EXR_T_CHROMATICITIES};
+        memcpy(v.v, o->primaries.xy, sizeof o->primaries.xy);
+        attrs[n++] = (rl_exr_attribute){"chromaticities", v};
+    }
+    rl_exr_value fps;
+    bool has = f->source && rl_exr_attr(f->source, f->source_part, "framesPerSecond", &fps);
+    if (!has && f->fps > 0)
+        attrs[n++] = (rl_exr_attribute){"framesPerSecond",
+                                        {.type = RL_EXR_T_RATIONAL, .v = {(double)(int)(f->fps * 1000 + 0.5), 1000}}};
+    return n;
+}
+
+static rl_code write_exr(const char *path, const rl_sink_output *o, const rl_sink_image *images, size_t n,
+                         const rl_sink_frame *f, const region *r, const float *coverage, rl_pool *pool,
+                         uint64_t *clamped, rl_error *err)
+{
+    rl_exr_pixel type = o->spec->type == RL_FLOAT ? RL_EXR_FLOAT : RL_EXR_HALF;
+    channel_list *list = rl_calloc(1, sizeof *list);
+    if (!list)
+        return rl_fail_memory(err, sizeof *list);
+    for (size_t i = 0; i < n; i++)
+        add_image(list, &images[i], type, r);
+    add_coverage(list, images, n, coverage, r->width, type);
+    rl_exr_attribute attrs[8];
+    int compression = o->spec->compression ? rl_exr_compression_named(o->spec->compression) : RL_EXR_ZIP;
+    rl_exr_image image = {.data_window = r->window,
+                          .display_window = f->display_window,
+                          .channels = list->rows,
+                          .n_channels = list->n,
+                          .compression = compression < 0 ? RL_EXR_ZIP : (rl_exr_compression)compression,
+                          .level = o->spec->level,
+                          .dwa_level = o->spec->quality > 0 ? (float)o->spec->quality : 0,
+                          .attrs = attrs,
+                          .n_attrs = add_attributes(o, f, attrs),
+                          .copy_from = f->source,
+                          .copy_part = f->source_part,
+                          .copy = kept_attributes,
+                          .n_copy = sizeof kept_attributes / sizeof *kept_attributes};
+    if (f->source) {
+        const rl_exr_part *part = rl_exr_part_at(f->source, f->source_part);
+        image.pixel_aspect = part->pixel_aspect;
+        image.screen_width = part->screen_width;
+        memcpy(image.screen_center, part->screen_center, sizeof image.screen_center);
+    }
+    rl_code code = list->failed ? rl_fail_file(err, RL_E_MEMORY, path, "too many channels for one file")
+                                : rl_exr_write(path, &image, pool, clamped, err);
+    rl_arena_free(&list->names);
+    rl_free(list);
+    return code;
+}
+
+rl_code rl_sink_write(const char *path, const rl_sink_output *output, const rl_sink_image *images, size_t n_images,
+                      const rl_sink_frame *frame, rl_pool *pool, uint64_t *clamped, rl_error *err)
+{
+    region r;
+    float *coverage = NULL;
+    rl_arena arena = {0};
+    rl_code code = crop_region(frame, &r, err);
+    if (!code)
+        code = rl_folder_make(rl_path_folder(&arena, path), err);
+    if (!code)
+        code = make_coverage(frame, &r, pool, &coverage, err);
+    if (!code && !strcmp(rl_path_extension(path), ".exr"))
+        code = write_exr(path, output, images, n_images, frame, &r, coverage, pool, clamped, err);
+    else if (!code)
+        code = rl_sink_write_image(path, output, &images[0], (size_t)r.y0 * images[0].stride + (size_t)r.x0, r.width,
+                                   r.height, frame, pool, clamped, err);
+    rl_free(coverage);
+    rl_arena_free(&arena);
+    return code;
+}

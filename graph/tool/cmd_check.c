@@ -1,0 +1,67 @@
+/* `relit check`: all that can be known without a pixel. */
+#include <jansson.h>
+#include <stdlib.h>
+
+#include "graph/tool/outdir.h"
+#include "graph/tool/tool.h"
+
+static void print_frames(const rl_session *s, size_t capture, rl_str *out)
+{
+    size_t n = rl_session_frames(s, capture);
+    rl_str_printf(out, "  capture '%s': %zu %s", rl_session_capture_name(s, capture), n,
+                  n == 1 ? "frame" : "frames");
+    if (n == 1)
+        rl_str_printf(out, " (%lld)", rl_session_frame(s, capture, 0));
+    else if (n > 1)
+        rl_str_printf(out, " (%lld to %lld)", rl_session_frame(s, capture, 0),
+                      rl_session_frame(s, capture, n - 1));
+    rl_str_add(out, "\n");
+}
+
+static void print_text(const rl_tool *tool, const rl_session *s, rl_str *out)
+{
+    rl_str_printf(out, "%s: OK\n", tool->args.run.pipeline);
+    for (size_t i = 0; i < rl_session_captures(s); i++)
+        print_frames(s, i, out);
+    rl_str_add(out, "  the plan is made, the kernels compile\n");
+}
+
+static void print_json(const rl_tool *tool, const rl_session *s, rl_str *out)
+{
+    json_t *captures = json_array();
+    for (size_t i = 0; i < rl_session_captures(s); i++) {
+        json_t *frames = json_array();
+        for (size_t k = 0; k < rl_session_frames(s, i); k++)
+            json_array_append_new(frames, json_integer(rl_session_frame(s, i, k)));
+        json_array_append_new(
+            captures, json_pack("{s:s, s:o}", "name", rl_session_capture_name(s, i), "frames", frames));
+    }
+    json_t *object =
+        json_pack("{s:s, s:b, s:o}", "pipeline", tool->args.run.pipeline, "ok", 1, "captures", captures);
+    char *text = object ? json_dumps(object, JSON_COMPACT) : NULL;
+    if (text)
+        rl_str_printf(out, "%s\n", text);
+    else
+        out->failed = true;
+    free(text);
+    json_decref(object);
+}
+
+int rl_cmd_check(rl_tool *tool, rl_error *err)
+{
+    rl_session *session = NULL;
+    rl_str text = {0};
+    int status = RL_EXIT_WRONG;
+
+    if (rl_session_open(&tool->args.run, &session, err) || rl_session_prepare(session, err) ||
+        rl_outdir_check(tool->arena, tool->args.run.out, err))
+        goto done;
+    if (tool->args.json)
+        print_json(tool, session, &text);
+    else
+        print_text(tool, session, &text);
+    status = rl_tool_print(tool, &text, err);
+done:
+    rl_session_close(&session);
+    return status;
+}

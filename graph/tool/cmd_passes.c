@@ -1,0 +1,179 @@
+/* `relit passes`: the passes of this build, printed from their tables. */
+#include <jansson.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "graph/model/graph.h"
+#include "graph/model/params.h"
+#include "graph/tool/tool.h"
+
+static const char *const role_names[] = {"in", "out", "history", "scratch"};
+static const char *const type_names[] = {"number", "integer", "true|false", "word", "rgb"};
+
+/* ---- text ------------------------------------------------------------------------------------------------
+ */
+
+static void print_list(rl_str *out)
+{
+    size_t width = 0;
+    for (size_t i = 0; i < rl_pass_count(); i++)
+        width = strlen(rl_pass_at(i)->name) > width ? strlen(rl_pass_at(i)->name) : width;
+    for (size_t i = 0; i < rl_pass_count(); i++)
+        rl_str_printf(out, "%-*s  %s\n", (int)width, rl_pass_at(i)->name, rl_pass_at(i)->help);
+    rl_str_add(out, "\n`relit passes NAME` prints a pass's ports and parameters.\n");
+}
+
+static size_t widest(const char *title, rl_params rows)
+{
+    size_t width = strlen(title);
+    for (size_t i = 0; i < rows.n; i++)
+        width = strlen(rows.rows[i].name) > width ? strlen(rows.rows[i].name) : width;
+    return width;
+}
+
+static void print_ports(const rl_pass *pass, rl_str *out)
+{
+    size_t width = 0;
+    for (size_t i = 0; i < pass->ports.n; i++)
+        width = strlen(pass->ports.rows[i].name) > width ? strlen(pass->ports.rows[i].name) : width;
+    rl_str_add(out, "\nports\n");
+    for (size_t i = 0; i < pass->ports.n; i++) {
+        const rl_port *p = &pass->ports.rows[i];
+        if (p->role == RL_SCRATCH)
+            continue;
+        rl_str_printf(out, "  %-7s  %-*s  %-6s  %s", role_names[p->role], (int)width, p->name,
+                      rl_format_name(p->format), p->help);
+        if (p->optional)
+            rl_str_add(out, " (optional)");
+        if (p->role == RL_HISTORY)
+            rl_str_printf(out, " (of '%s', one frame before)", p->of);
+        rl_str_add(out, "\n");
+    }
+}
+
+static void print_rows(const char *title, rl_params rows, rl_str *out)
+{
+    if (!rows.n)
+        return;
+    int width = (int)widest("", rows);
+    rl_str_printf(out, "\n%s\n", title);
+    for (size_t i = 0; i < rows.n; i++) {
+        const rl_param *row = &rows.rows[i];
+        rl_str_printf(out, "  %-*s  %s%s\n  %-*s    ", width, row->name, row->help,
+                      row->required ? " (required)" : "", width, "");
+        rl_param_describe(row, out);
+        if (row->source)
+            rl_str_printf(out, "; %s", row->source);
+        rl_str_add(out, "\n");
+    }
+}
+
+static void print_pass(const rl_pass *pass, rl_str *out)
+{
+    rl_str_printf(out, "%s: %s\n", pass->name, pass->help);
+    if (pass->source)
+        rl_str_printf(out, "source: %s\n", pass->source);
+    print_ports(pass, out);
+    print_rows("parameters (graph.NODE.…)", pass->params, out);
+    print_rows("profile keys (profiles.NAME.…)", pass->profile_keys, out);
+    print_rows("material keys (materials.NAME.…)", pass->material_keys, out);
+    print_rows("shading keys (shading.…, or in a material)", pass->shading_keys, out);
+}
+
+/* ---- JSON ------------------------------------------------------------------------------------------------
+ */
+
+static json_t *default_json(const rl_param *row)
+{
+    rl_str text = {0};
+    union {
+        float f[3];
+        int32_t i;
+    } value = {{0}};
+    rl_param_default(row, &value);
+    rl_param_print(row, &value, &text);
+    json_t *json = json_string(rl_str_text(&text));
+    rl_str_free(&text);
+    return json;
+}
+
+static json_t *rows_json(rl_params rows)
+{
+    json_t *list = json_array();
+    for (size_t i = 0; i < rows.n; i++) {
+        const rl_param *row = &rows.rows[i];
+        json_t *object =
+            json_pack("{s:s, s:s, s:s, s:s, s:o, s:b, s:s*}", "name", row->name, "type",
+                      type_names[row->type], "unit", row->unit ? row->unit : "", "help", row->help, "default",
+                      default_json(row), "required", (int)row->required, "source", row->source);
+        if (object && row->words)
+            json_object_set_new(object, "words", json_string(row->words));
+        if (object && row->type != RL_ENUM && row->type != RL_BOOL)
+            json_object_set_new(object, "range", json_pack("[f, f]", row->min, row->max));
+        json_array_append_new(list, object);
+    }
+    return list;
+}
+
+static json_t *pass_json(const rl_pass *pass)
+{
+    json_t *ports = json_array();
+    for (size_t i = 0; i < pass->ports.n; i++) {
+        const rl_port *p = &pass->ports.rows[i];
+        if (p->role != RL_SCRATCH)
+            json_array_append_new(ports,
+                                  json_pack("{s:s, s:s, s:s, s:b, s:s, s:s*}", "name", p->name, "role",
+                                            role_names[p->role], "format", rl_format_name(p->format),
+                                            "optional", (int)p->optional, "help", p->help, "of", p->of));
+    }
+    return json_pack("{s:s, s:s, s:s*, s:o, s:o, s:o, s:o, s:o}", "name", pass->name, "help", pass->help,
+                     "source", pass->source, "ports", ports, "parameters", rows_json(pass->params),
+                     "profile_keys", rows_json(pass->profile_keys), "material_keys",
+                     rows_json(pass->material_keys), "shading_keys", rows_json(pass->shading_keys));
+}
+
+static void print_json(const rl_pass *pass, rl_str *out)
+{
+    json_t *json = pass ? pass_json(pass) : json_array();
+    for (size_t i = 0; !pass && i < rl_pass_count(); i++)
+        json_array_append_new(json, pass_json(rl_pass_at(i)));
+    char *text = json_dumps(json, JSON_INDENT(1) | JSON_REAL_PRECISION(9));
+    if (text)
+        rl_str_printf(out, "%s\n", text);
+    else
+        out->failed = true;
+    free(text);
+    json_decref(json);
+}
+
+static rl_code unknown(const rl_tool *tool, rl_error *err)
+{
+    const char **known = rl_arena_array(tool->arena, rl_pass_count(), sizeof *known);
+    if (!known)
+        return rl_fail_memory(err, rl_pass_count() * sizeof *known);
+    for (size_t i = 0; i < rl_pass_count(); i++)
+        known[i] = rl_pass_at(i)->name;
+    rl_str text = {0};
+    rl_suggest(&text, tool->args.operand, known, rl_pass_count(), "known");
+    rl_fail_file(err, RL_E_USAGE, "relit passes", "there is no pass '%s'%s", tool->args.operand,
+                 rl_str_text(&text));
+    rl_str_free(&text);
+    return RL_E_USAGE;
+}
+
+int rl_cmd_passes(rl_tool *tool, rl_error *err)
+{
+    const rl_pass *pass = tool->args.operand ? rl_pass_find(tool->args.operand) : NULL;
+    rl_str text = {0};
+    if (tool->args.operand && !pass) {
+        unknown(tool, err);
+        return RL_EXIT_WRONG;
+    }
+    if (tool->args.json)
+        print_json(pass, &text);
+    else if (pass)
+        print_pass(pass, &text);
+    else
+        print_list(&text);
+    return rl_tool_print(tool, &text, err);
+}

@@ -1,0 +1,54 @@
+/* `relit plan`: the plan of each capture, as text, graphviz, drawn, or JSON. */
+#include <string.h>
+
+#include "graph/tool/svg.h"
+#include "graph/tool/tool.h"
+
+static rl_code print_capture(const rl_session *session, size_t capture, rl_plan_word word, rl_str *out,
+                             rl_error *err)
+{
+    static const rl_plan_format formats[] = {RL_PLAN_TEXT, RL_PLAN_DOT, RL_PLAN_DOT, RL_PLAN_JSON};
+    char *text = NULL;
+    rl_code code = rl_session_plan(session, capture, formats[word], &text, err);
+    if (!code && word == RL_WORD_SVG)
+        code = rl_svg_from_dot(text, out, err);
+    else if (!code)
+        rl_str_add(out, text);
+    if (!code && out->length && out->text[out->length - 1] != '\n')
+        rl_str_add(out, "\n");
+    rl_text_free(text);
+    return code;
+}
+
+/* Text: one after the other. JSON: an object a line and capture. A drawing is one file: of the first. */
+int rl_cmd_plan(rl_tool *tool, rl_error *err)
+{
+    rl_session *session = NULL;
+    rl_str text = {0};
+    rl_plan_word word = tool->args.json ? RL_WORD_JSON : (rl_plan_word)tool->args.format;
+    int status = RL_EXIT_WRONG;
+
+    if (tool->args.json && tool->args.format != RL_WORD_TEXT && tool->args.format != RL_WORD_JSON) {
+        rl_fail_file(err, RL_E_USAGE, "relit plan", "--json and --format exclude each other");
+        goto done;
+    }
+    if (rl_session_open(&tool->args.run, &session, err))
+        goto done;
+    size_t n = rl_session_captures(session);
+    bool drawing = word == RL_WORD_SVG || word == RL_WORD_DOT;
+    for (size_t i = 0; i < (drawing && n ? 1 : n); i++) {
+        if (word == RL_WORD_TEXT && n > 1)
+            rl_str_printf(&text, "%scapture '%s'\n", i ? "\n" : "", rl_session_capture_name(session, i));
+        if (print_capture(session, i, word, &text, err))
+            goto done;
+    }
+    if (drawing && n > 1)
+        rl_report(&tool->report->log, RL_NOTE, RL_NOWHERE,
+                  "the drawing is of the first capture, '%s'; --capture chooses another",
+                  rl_session_capture_name(session, 0));
+    status = rl_tool_print(tool, &text, err);
+done:
+    rl_str_free(&text);
+    rl_session_close(&session);
+    return status;
+}

@@ -1,0 +1,100 @@
+#include "graph/tool/tool.h"
+
+#include <string.h>
+
+typedef struct command {
+    rl_command_info info;
+    rl_command_function run;
+} command;
+
+static const command commands[] = {
+    {{"run", RL_CMD_RUN, "PIPELINE", "process frames",
+      "Reads the frames of the pipeline's capture, runs its graph and writes its\n"
+      "outputs. A file under its final name is whole. A frame that fails does not stop\n"
+      "the others.\n"},
+     rl_cmd_run},
+    {{"check", RL_CMD_CHECK, "PIPELINE", "validate everything without processing a pixel",
+      "Reads the pipeline, opens the headers of the capture, makes the plan and\n"
+      "compiles the kernels. Writes nothing.\n"},
+     rl_cmd_check},
+    {{"plan", RL_CMD_PLAN, "PIPELINE", "show the graph: order, lifetimes, memory, culled passes", NULL},
+     rl_cmd_plan},
+    {{"init", RL_CMD_INIT, "CAPTURE", "print a starter pipeline for a capture",
+      "CAPTURE is a capture.yaml, a folder that holds one, or an EXR file or pattern.\n"
+      "The pipeline has the capture's lights and materials, and the standard graph:\n"
+      "    relit init captures/monkey > monkey.yaml && relit run monkey.yaml\n"
+      "Paths in it are relative to the working folder: keep it there, or edit them.\n"},
+     rl_cmd_init},
+    {{"inspect", RL_CMD_INSPECT, "FILE|DIR", "show parts, channels, metadata, guessed capture mapping", NULL},
+     rl_cmd_inspect},
+    {{"passes", RL_CMD_PASSES, "[NAME]", "list the passes, or one's ports and parameters", NULL},
+     rl_cmd_passes},
+    {{"devices", RL_CMD_DEVICES, NULL, "list OpenCL devices, and which one a run would take", NULL},
+     rl_cmd_devices},
+};
+
+enum { N_COMMANDS = sizeof commands / sizeof *commands };
+
+int rl_tool_print(rl_tool *tool, rl_str *s, rl_error *err)
+{
+    if (s->failed)
+        rl_fail_memory(err, s->length);
+    else
+        rl_report_result(tool->report, rl_str_text(s), err);
+    rl_str_free(s);
+    return err->code ? RL_EXIT_WRONG : RL_EXIT_DONE;
+}
+
+static int run_command(rl_tool *tool, const rl_commands *infos, int argc, char **argv, rl_error *err)
+{
+    size_t index;
+    if (rl_command_find(infos, argv[1], &index, err))
+        return RL_EXIT_WRONG;
+    const command *c = &commands[index];
+    if (rl_arguments_parse(tool->arena, infos, &c->info, argc - 2, argv + 2, &tool->args, err))
+        return RL_EXIT_WRONG;
+    if (tool->args.help) {
+        rl_str text = {0};
+        rl_help_command(&c->info, &text);
+        return rl_tool_print(tool, &text, err);
+    }
+    tool->args.run.pipeline = tool->args.operand;
+    tool->args.run.log = &tool->report->log;
+    tool->report->quiet = tool->args.quiet;
+    tool->report->verbose = tool->args.verbose;
+    tool->report->json = tool->args.json;
+    return c->run(tool, err);
+}
+
+int rl_tool_main(int argc, char **argv, FILE *out, FILE *err)
+{
+    rl_arena arena = {0};
+    rl_reporter reporter;
+    rl_error error = {0};
+    rl_tool tool = {.report = &reporter, .arena = &arena};
+    const rl_command_info *rows[N_COMMANDS];
+    rl_commands infos = {rows, N_COMMANDS};
+    rl_str text = {0};
+    int status;
+
+    for (size_t i = 0; i < N_COMMANDS; i++)
+        rows[i] = &commands[i].info;
+    rl_reporter_begin(&reporter, out, err);
+    if (argc < 2) {
+        rl_fail_file(&error, RL_E_USAGE, "relit", "needs a command, see `relit --help`");
+        status = RL_EXIT_WRONG;
+    } else if (!strcmp(argv[1], "--help") || !strcmp(argv[1], "-h")) {
+        rl_help_overview(&infos, &text);
+        status = rl_tool_print(&tool, &text, &error);
+    } else if (!strcmp(argv[1], "--version")) {
+        rl_str_add(&text, "relit " RL_VERSION "\n");
+        status = rl_tool_print(&tool, &text, &error);
+    } else {
+        status = run_command(&tool, &infos, argc, argv, &error);
+    }
+    if (error.code)
+        rl_report_error(&reporter, &error);
+    rl_reporter_end(&reporter);
+    rl_arena_free(&arena);
+    return status;
+}

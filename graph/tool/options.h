@@ -1,0 +1,58 @@
+/* The command line. One table of options drives parsing, `--help` and did-you-mean. */
+#ifndef RL_TOOL_OPTIONS_H
+#define RL_TOOL_OPTIONS_H
+
+#include <stdbool.h>
+#include <stddef.h>
+
+#include "graph/base/arena.h"
+#include "graph/base/text.h"
+#include "graph/relit.h"
+
+/* Bits: which commands take an option. */
+typedef enum rl_command_bit {
+    RL_CMD_RUN = 1,
+    RL_CMD_CHECK = 2,
+    RL_CMD_PLAN = 4,
+    RL_CMD_INIT = 8,
+    RL_CMD_INSPECT = 16,
+    RL_CMD_PASSES = 32,
+    RL_CMD_DEVICES = 64
+} rl_command_bit;
+
+/* A command as the parser and the help see it. */
+typedef struct rl_command_info {
+    const char *name;
+    rl_command_bit bit;
+    const char *operand; /* "PIPELINE", "[NAME]" (may be left out), or NULL: takes none */
+    const char *help;    /* one line */
+    const char *more;    /* paragraphs for `relit NAME --help`, lines under 80 columns, or NULL */
+} rl_command_info;
+
+typedef struct rl_commands {
+    const rl_command_info *const *rows;
+    size_t n;
+} rl_commands;
+
+typedef enum rl_plan_word { RL_WORD_TEXT, RL_WORD_DOT, RL_WORD_SVG, RL_WORD_JSON } rl_plan_word;
+
+/* What was asked for. Lists live in the arena that rl_arguments_parse was given, strings in argv or there. */
+typedef struct rl_arguments {
+    const char *operand;    /* or NULL */
+    rl_options run;         /* handed to rl_session_open as it is, after .pipeline and .log are set */
+    int on_missing, format; /* words, as indices of rl_on_missing and rl_plan_word */
+    bool json, quiet, verbose, help;
+} rl_arguments;
+
+/* Reads the words behind the command's name. An error is RL_E_USAGE and names the nearest option. */
+rl_code rl_arguments_parse(rl_arena *arena, const rl_commands *commands, const rl_command_info *command,
+                           int argc, char **argv, rl_arguments *out, rl_error *err);
+
+/* `relit --help`, `relit NAME --help`. */
+void rl_help_overview(const rl_commands *commands, rl_str *out);
+void rl_help_command(const rl_command_info *command, rl_str *out);
+
+/* The command of that name, or an error with the nearest. */
+rl_code rl_command_find(const rl_commands *commands, const char *name, size_t *out, rl_error *err);
+
+#endif

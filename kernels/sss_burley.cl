@@ -1,0 +1,284 @@
+/* Importance-sampled subsurface scattering with Burley's profile (Golubev 2018), in the form that suits wide vectors:
+ * the pattern is turned a phase at a time, so that a tap is one offset for a whole vector and every load contiguous;
+ * one scale serves the lanes of a vector that are about equally far away, and each lane's weights use its own.
+ *
+ * Tap i stands for the light of 1/n of the profile at its exact place, and reads the pixel that this place is in. So the
+ * sum over taps tends to the sum over pixels of the profile's integral over the pixel's square. */
+
+#define TAP_BLOCK 64        /* taps that are turned and rounded at a time */
+#define AHEAD     8         /* taps from fetching to loading */
+#define TURNS     256       /* directions in the table */
+#define NEAR      0.8f      /* lanes share a scale from here to 1 times the farthest */
+#define MIN_WEIGHT 1e-12f      /* less in all than a sample 80 d away has: the pixel keeps its own light */
+
+/* Level of detail, by the filter's radius in pixels: from which radius on there is a filter, and the taps of the small
+ * and of the large one. passes/sss_burley.c makes the patterns. */
+#define LOD_SOME  0.5f
+#define LOD_MANY  2.0f
+#define TAPS_SOME 21
+#define TAPS_MANY 55
+
+enum { ROTATION_NONE = 0, ROTATION_PHASE = 1 };
+
+#if P_weighting == WEIGHTING_AREA
+#define AREA(x) x
+#else
+#define AREA(x)
+#endif
+
+/* Host tables: directions (cos, sin), then for each pattern its x, y, weight, padded to TAP_BLOCK. */
+#define TABLE_TURNS 0
+#define TABLE_TAPS  (2 * TURNS)
+
+/* What is constant for some lanes of a vector. */
+typedef struct group_t {
+    vector_t v;
+    floatv z;          /* depth */
+    floatv scale2;     /* (depth / middle depth)²: from the taps' radii to the lane's true ones, squared */
+    float inv_d;       /* 1 / the largest scattering distance, 1/m */
+    float k[2];        /* pixels a d at the middle depth */
+    float fall[3];     /* exponents of 2 a unit of r_u: -d_max / (3 d ln 2) */
+    float turn[2];     /* cos, sin of the pattern's turn */
+    float squeeze[3];  /* xx, xy, yy: from the disk to the screen's plane, less the identity */
+    int material;
+    intv keep;         /* all bits: samples that are none count as black */
+} group_t;
+
+/* The direction of a phase in a frame: the sixteen phases are a sixteenth of a turn apart, frames a golden section. */
+static inline int pattern_turn(int seed, int number, int px, int py)
+{
+    const int order[16] = {0, 8, 2, 10, 12, 4, 14, 6, 3, 11, 1, 9, 15, 7, 13, 5};
+    return (order[py * 4 + px] * (TURNS / 16) + number * 97 + (int)(rl_hash((uint)seed, 0, 0, 0) >> 24)) & (TURNS - 1);
+}
+
+/* 2^x for x <= 0, relative error below 3e-6; x below -125 counts as -125: nothing beside any other weight. */
+static inline floatv weight_exp2(floatv x)
+{
+    const float magic = 12582912.0f;
+    x = fmax(x, -125.0f);
+    floatv r = x + magic, t = x - (r - magic);
+    floatv p = 9.57010191e-3f; /* minimax, degree 4 */
+    p = fma(p, t, 5.59178603e-2f);
+    p = fma(p, t, 2.40247448e-1f);
+    p = fma(p, t, 6.93121815e-1f);
+    p = fma(p, t, 9.99999261e-1f);
+    return rl_as_floatv(rl_as_intv(p) + (rl_as_intv(r) << 23)); /* magic's own low bits are 0 */
+}
+
+/* Taps first…first+n-1, n <= TAP_BLOCK: index of the vector, radius² in units of d, weight. There are RL_W more
+ * indices behind the last, for looking ahead. */
+static inline void place_taps(const inputs_t *in, const group_t *g, constant float *taps, int stride, int first, int n,
+                              int *at, float *r2, float *weight)
+{
+    const float magic = 12582912.0f;
+    constant frame_t *f = in->f;
+    int rows4 = f->rows >> 2;
+    int i = 0;
+    for (; i < n; i += RL_W) {
+        floatv x = rl_vload(0, taps + first + i), y = rl_vload(0, taps + stride + first + i);
+        floatv u = fma(x, (floatv)g->turn[0], -(y * g->turn[1])), v = fma(x, (floatv)g->turn[1], y * g->turn[0]);
+#if P_orientation == ORIENTATION_TANGENT
+        floatv flat = u;
+        u = fma(v, (floatv)g->squeeze[1], fma(u, (floatv)g->squeeze[0], u));
+        v = fma(flat, (floatv)g->squeeze[1], fma(v, (floatv)g->squeeze[2], v));
+#endif
+        intv dx = rl_as_intv(fma(u, (floatv)g->k[0], (floatv)magic)) - as_int(magic);
+        intv dy = rl_as_intv(fma(v, (floatv)g->k[1], (floatv)magic)) - as_int(magic);
+        dx += g->v.px;
+        dy += g->v.py;
+        intv row = (dy >> 2) + g->v.sy;
+        intv column = clamp((dx >> 2) + g->v.sx, -RL_MARGIN4, f->columns >> 2);
+        intv a = (((dy & 3) * 4 + (dx & 3)) * rows4 + row) * f->stride4 + RL_MARGIN4 + column;
+        intv inside = (row >= 0) & (row < rows4);
+        rl_vstore(a & inside, 0, at + i); /* index 0 is a margin: no material */
+        rl_vstore(fma(u, u, v * v), 0, r2 + i);
+        rl_vstore(rl_vload(0, taps + 2 * stride + first + i), 0, weight + i);
+    }
+    rl_vstore((intv)g->v.at, 0, at + i);
+}
+
+/* The planes of a tap that comes soon. */
+static inline void fetch_tap(const inputs_t *in, int at)
+{
+    int plane = in->f->plane4;
+    scatter_fetch((global const float *)in->stencil + at);
+    scatter_fetch(in->depth + at);
+    AREA(scatter_fetch(in->area + at);)
+    scatter_fetch(in->diffuse + at);
+    scatter_fetch(in->diffuse + plane + at);
+    scatter_fetch(in->diffuse + 2 * plane + at);
+}
+
+/* Weighted means of n taps; lanes without a sample keep what `out` holds. */
+static inline void sum_taps(const inputs_t *in, const group_t *g, constant float *taps, int n, floatv out[3])
+{
+    int stride = (n + TAP_BLOCK - 1) / TAP_BLOCK * TAP_BLOCK, plane = in->f->plane4;
+    floatv w0 = 0.0f, w1 = 0.0f, w2 = 0.0f, c0 = 0.0f, c1 = 0.0f, c2 = 0.0f;
+    int at[TAP_BLOCK + RL_W];
+    float r2[TAP_BLOCK], weight[TAP_BLOCK];
+    AREA(floatv per_own = 1.0f / rl_vload(0, in->area + g->v.at);)
+    for (int first = 0; first < n; first += TAP_BLOCK) {
+        int last = min(TAP_BLOCK, n - first);
+        place_taps(in, g, taps, stride, first, last, at, r2, weight);
+        for (int i = 0; i < AHEAD; i++)
+            fetch_tap(in, at[i]);
+        for (int i = 0; i < last; i++) {
+            int a = at[i];
+            fetch_tap(in, at[i + AHEAD]);
+            intv same = rl_as_intv(rl_vload(0, in->stencil + a)) == g->material;
+            floatv dz = scatter_keep((rl_vload(0, in->depth + a) - g->z) * g->inv_d, same);
+            floatv q = fma(dz, dz, g->scale2 * r2[i]), ir = rsqrt(q), r = q * ir;
+            floatv common = scatter_keep(ir * weight[i], same | g->keep);
+            AREA(common *= rl_select((floatv)1.0f, rl_vload(0, in->area + a) * per_own, same);)
+            floatv e0 = weight_exp2(r * g->fall[0]), e1 = weight_exp2(r * g->fall[1]),
+                   e2 = weight_exp2(r * g->fall[2]);
+            e0 = fma(e0, e0, (floatv)1.0f) * (e0 * common);
+            e1 = fma(e1, e1, (floatv)1.0f) * (e1 * common);
+            e2 = fma(e2, e2, (floatv)1.0f) * (e2 * common);
+            w0 += e0;
+            w1 += e1;
+            w2 += e2;
+            c0 = fma(e0, scatter_keep(rl_vload(0, in->diffuse + a), same), c0);
+            c1 = fma(e1, scatter_keep(rl_vload(0, in->diffuse + plane + a), same), c1);
+            c2 = fma(e2, scatter_keep(rl_vload(0, in->diffuse + 2 * plane + a), same), c2);
+        }
+    }
+    out[0] = rl_select(out[0], c0 / w0, w0 > MIN_WEIGHT);
+    out[1] = rl_select(out[1], c1 / w1, w1 > MIN_WEIGHT);
+    out[2] = rl_select(out[2], c2 / w2, w2 > MIN_WEIGHT);
+}
+
+/* 0 below 0.9 of the threshold, 1 above 1.1 of it. */
+static inline floatv beyond(floatv rho, float threshold)
+{
+    return clamp((rho - 0.9f * threshold) * (5.0f / threshold), 0.0f, 1.0f);
+}
+
+#if P_orientation == ORIENTATION_TANGENT
+static inline int sum_lanes(intv v)
+{
+    int lanes[RL_W], sum = 0;
+    rl_vstore(v, 0, lanes);
+    for (int i = 0; i < RL_W; i++)
+        sum += lanes[i];
+    return sum;
+}
+
+/* Lays the disk into the mean tangent plane of the lanes `now`. Seen along the view axis it is squeezed by the cosine
+ * in the direction t of the slope: I + (cos - 1) t t'. Tilts are rounded to 1/1024, so that their sum is exact. */
+static inline void lay_disk(const inputs_t *in, group_t *g, intv now)
+{
+    const float magic = 12582912.0f;
+    floatv tx = scatter_tilt(in, &g->v, g->z, 1, 0), ty = scatter_tilt(in, &g->v, g->z, 0, 1);
+    intv ix = rl_as_intv(fma(tx, (floatv)1024.0f, (floatv)magic)) - as_int(magic);
+    intv iy = rl_as_intv(fma(ty, (floatv)1024.0f, (floatv)magic)) - as_int(magic);
+    float count = 1024.0f * (float)sum_lanes(now & 1);
+    float x = (float)sum_lanes(ix & now) / count, y = (float)sum_lanes(iy & now) / count;
+    float slope2 = fma(x, x, y * y), cosine = 1.0f / sqrt(1.0f + slope2);
+    float less = slope2 > 0.0f ? (cosine - 1.0f) / slope2 : 0.0f;
+    g->squeeze[0] = less * x * x;
+    g->squeeze[1] = less * x * y;
+    g->squeeze[2] = less * y * y;
+}
+#endif
+
+/* The lanes `now` of the group, with the pattern that their size on screen asks for. */
+static inline void filter_group(const inputs_t *in, const group_t *g, constant params_t *p, constant float *taps,
+                                intv now, floatv out[3])
+{
+    floatv sum[3] = {out[0], out[1], out[2]};
+    if (p->taps > 0) {
+        sum_taps(in, g, taps, p->taps, sum);
+    } else {
+        float focal = fmax(in->f->camera.focal[0], in->f->camera.focal[1]);
+        floatv rho = BURLEY_RADIUS * focal / (g->inv_d * g->z);
+        floatv some = beyond(rho, LOD_SOME), many = beyond(rho, LOD_MANY);
+        if (!scatter_any(now & (some > 0.0f)))
+            return;
+        floatv fine[3] = {out[0], out[1], out[2]};
+        if (scatter_any(now & (many < 1.0f)))
+            sum_taps(in, g, taps, TAPS_SOME, sum);
+        if (scatter_any(now & (many > 0.0f)))
+            sum_taps(in, g, taps + 3 * TAP_BLOCK, TAPS_MANY, fine);
+        for (int c = 0; c < 3; c++) {
+            sum[c] = fma(many, fine[c] - sum[c], sum[c]);
+            sum[c] = fma(some, sum[c] - out[c], out[c]);
+        }
+    }
+    for (int c = 0; c < 3; c++)
+        out[c] = rl_select(out[c], sum[c], now);
+}
+
+static inline void filter_material(const inputs_t *in, const vector_t *v, constant params_t *p,
+                                   constant float *tables, int material, constant material_t *mat, intv mine,
+                                   floatv out[3])
+{
+    group_t g;
+    constant float *d = mat->profile_scatter_distance_mm;
+    float most = fmax(d[0], fmax(d[1], d[2]));
+    g.v = *v;
+    g.z = rl_vload(0, in->depth + v->at);
+    g.inv_d = 1e3f / most;
+    for (int c = 0; c < 3; c++)
+        g.fall[c] = -0.480898347f * (most / d[c]);
+    int turn = p->rotation == ROTATION_PHASE ? pattern_turn(p->seed, in->f->number, v->px, v->py) : 0;
+    g.turn[0] = tables[TABLE_TURNS + 2 * turn];
+    g.turn[1] = tables[TABLE_TURNS + 2 * turn + 1];
+    g.material = material;
+    g.keep = mat->profile_border == BORDER_OCCLUDE ? -1 : 0;
+    while (scatter_any(mine)) { /* once as a rule, more at silhouettes */
+        float far = scatter_farthest(g.z, mine);
+        intv now = mine & (g.z >= NEAR * far);
+        now = scatter_any(now) ? now : mine;
+        mine &= ~now;
+        float middle = 0.5f * (far + scatter_nearest(g.z, now));
+        floatv s = g.z / middle;
+        g.scale2 = s * s;
+        g.k[0] = in->f->camera.focal[0] / (middle * g.inv_d);
+        g.k[1] = in->f->camera.focal[1] / (middle * g.inv_d);
+#if P_orientation == ORIENTATION_TANGENT
+        lay_disk(in, &g, now);
+#endif
+        filter_group(in, &g, p, tables + TABLE_TAPS, now, out);
+    }
+}
+
+kernel void sss_burley_filter(global const float *diffuse, global const float *lit, global const float *albedo,
+                              global const float *normal, global const float *depth, global const uint *stencil,
+                              global float *area, global float *filtered, global float *color, constant params_t *p,
+                              constant frame_t *f, constant material_t *materials, constant float *tables)
+{
+    inputs_t in = {diffuse, depth, area, stencil, f};
+    vector_t v = scatter_vector(f);
+    intv id = rl_as_intv(rl_vload(0, stencil + v.at)), left = id != 0;
+    if (!scatter_any(left))
+        return;
+    floatv out[3];
+    for (int c = 0; c < 3; c++)
+        out[c] = rl_vload(0, diffuse + c * f->plane4 + v.at);
+    while (scatter_any(left)) {
+        int m = scatter_max_int(id & left);
+        intv mine = left & (id == m);
+        left &= ~mine;
+        if (materials[m].has_profile)
+            filter_material(&in, &v, p, tables, m, &materials[m], mine, out);
+    }
+    for (int c = 0; c < 3; c++)
+        rl_vstore(out[c], 0, filtered + c * f->plane4 + v.at);
+}
+
+kernel void sss_burley_area(global const float *diffuse, global const float *lit, global const float *albedo,
+                            global const float *normal, global const float *depth, global const uint *stencil,
+                            global float *area, global float *filtered, global float *color, constant params_t *p,
+                            constant frame_t *f, constant material_t *materials, constant float *tables)
+{
+    AREA(scatter_area(depth, stencil, area, f);)
+}
+
+kernel void sss_burley_resolve(global const float *diffuse, global const float *lit, global const float *albedo,
+                               global const float *normal, global const float *depth, global const uint *stencil,
+                               global float *area, global float *filtered, global float *color, constant params_t *p,
+                               constant frame_t *f, constant material_t *materials, constant float *tables)
+{
+    scatter_resolve(filtered, lit, albedo, normal, stencil, color, f, materials);
+}

@@ -1,0 +1,172 @@
+/* The dense sum that the filters approximate: every pixel of the material within r_max of the pixel, weighted with
+ * the light that its square sends here, R(sqrt(r² + dz²)). Within two pixels the weight is integrated over the
+ * square (Gauss-Legendre), beyond it is taken at its middle; the pixel's own is P(pixel/sqrt(pi)), that of the disk
+ * of its area. The largest d of the material sets r_max for the three channels. */
+
+typedef struct sums_t {
+    floatv w[3], c[3]; /* weights; weights times light */
+} sums_t;
+
+/* What is constant for the pixels of one vector and one material. */
+typedef struct centre_t {
+    vector_t v;
+    floatv z;
+    floatv tilt_x, tilt_y; /* of the disk, depth a metre of the screen's plane */
+    float d[3];
+    float reach;
+    float px, py; /* a pixel's size on the plane z = -1 */
+    int material;
+    intv keep; /* all bits: samples that are none count as black */
+} centre_t;
+
+/* R(sqrt(r2)) for the three channels, without the factor 1/(8 pi). */
+static inline void burley(floatv r2, const float *d, floatv w[3])
+{
+    floatv r = sqrt(r2), ir = 1.0f / r;
+    for (int c = 0; c < 3; c++) {
+        floatv e = rl_exp2(r * (-0.480898347f / d[c])); /* e^{-r/(3d)} */
+        w[c] = (e * e * e + e) * ir * (1.0f / d[c]);
+    }
+}
+
+/* Mean of R over the square of the pixel (dx, dy) away, n² nodes. Six nodes for the eight neighbours and three for
+ * the sixteen around them leave 1e-5. */
+static inline void burley_square(const centre_t *at, int dx, int dy, floatv dz2, int n, floatv w[3])
+{
+    const float x6[6] = {-0.466234757f, -0.330604693f, -0.119309593f, 0.119309593f, 0.330604693f, 0.466234757f};
+    const float w6[6] = {0.0856622462f, 0.180380787f, 0.233956967f, 0.233956967f, 0.180380787f, 0.0856622462f};
+    const float x3[3] = {-0.387298335f, 0.0f, 0.387298335f}, w3[3] = {0.277777778f, 0.444444444f, 0.277777778f};
+    floatv z2 = at->z * at->z;
+    w[0] = w[1] = w[2] = 0.0f;
+    for (int j = 0; j < n; j++)
+        for (int i = 0; i < n; i++) {
+            float x = ((float)dx + (n == 6 ? x6[i] : x3[i])) * at->px;
+            float y = ((float)dy + (n == 6 ? x6[j] : x3[j])) * at->py;
+            float weight = n == 6 ? w6[i] * w6[j] : w3[i] * w3[j];
+            floatv v[3];
+            burley(fma(z2, (floatv)(x * x + y * y), dz2), at->d, v);
+            for (int c = 0; c < 3; c++)
+                w[c] = fma(v[c], (floatv)weight, w[c]);
+        }
+}
+
+/* P(pixel/sqrt(pi)) over the pixel's area, in the units of burley(). */
+static inline void burley_own(const centre_t *at, floatv w[3])
+{
+    floatv area = at->z * at->z * (at->px * at->py);
+    floatv r = sqrt(area * (1.0f / RL_PI));
+    for (int c = 0; c < 3; c++) {
+        floatv e = rl_exp2(r * (-0.480898347f / at->d[c]));
+        w[c] = (1.0f - 0.25f * e * e * e - 0.75f * e) / area * (8.0f * RL_PI);
+    }
+}
+
+/* The pixels (dx, dy) away join the sums of the lanes in `mine`. */
+static inline void gather(const inputs_t *in, const centre_t *at, int dx, int dy, intv mine, sums_t *s)
+{
+    float x = (float)dx * at->px, y = (float)dy * at->py;
+    floatv z2 = at->z * at->z, r2 = z2 * (x * x + y * y), disk2 = r2;
+#if P_orientation == ORIENTATION_TANGENT
+    floatv rise = at->tilt_x * x + at->tilt_y * y;
+    disk2 += z2 * rise * rise;
+#endif
+    int i = scatter_at(in->f, &at->v, dx, dy);
+    intv near = mine & (disk2 <= at->reach * at->reach);
+    intv same = near & (rl_as_intv(rl_vload(0, in->stencil + i)) == at->material), counts = near & (same | at->keep);
+    if (!scatter_any(counts))
+        return;
+    floatv dz = scatter_keep(rl_vload(0, in->depth + i) - at->z, same), w[3];
+    int ring = max(abs(dx), abs(dy));
+    if (ring == 0)
+        burley_own(at, w);
+    else if (ring <= 2)
+        burley_square(at, dx, dy, dz * dz, ring == 1 ? 6 : 3, w);
+    else
+        burley(fma(dz, dz, r2), at->d, w);
+#if P_weighting == WEIGHTING_AREA
+    floatv surface = rl_select(rl_vload(0, in->area + at->v.at), rl_vload(0, in->area + i), same);
+#endif
+    for (int c = 0; c < 3; c++) {
+#if P_weighting == WEIGHTING_AREA
+        w[c] *= surface;
+#endif
+        w[c] = scatter_keep(w[c], counts);
+        s->w[c] += w[c];
+        s->c[c] = fma(w[c], scatter_keep(rl_vload(0, in->diffuse + c * in->f->plane4 + i), same), s->c[c]);
+    }
+}
+
+static inline void filter_material(const inputs_t *in, const vector_t *v, int material, constant material_t *mat,
+                                   intv mine, floatv out[3])
+{
+    centre_t at;
+    at.v = *v;
+    at.z = rl_vload(0, in->depth + v->at);
+#if P_orientation == ORIENTATION_TANGENT
+    at.tilt_x = scatter_tilt(in, v, at.z, 1, 0);
+    at.tilt_y = scatter_tilt(in, v, at.z, 0, 1);
+#endif
+    at.px = 1.0f / in->f->camera.focal[0];
+    at.py = 1.0f / in->f->camera.focal[1];
+    for (int c = 0; c < 3; c++)
+        at.d[c] = mat->profile_scatter_distance_mm[c] * 1e-3f;
+    at.material = material;
+    at.keep = mat->profile_border == BORDER_OCCLUDE ? -1 : 0;
+    at.reach = BURLEY_RADIUS * fmax(at.d[0], fmax(at.d[1], at.d[2]));
+    float nearest = scatter_nearest(at.z, mine);
+    int ry = (int)fmin(at.reach / (nearest * at.py), 16384.0f);
+    sums_t total = {{0.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 0.0f}};
+    for (int dy = -ry; dy <= ry; dy++) {
+        float y = (float)dy * at.py * nearest;
+        int rx = (int)fmin(sqrt(fmax(at.reach * at.reach - y * y, 0.0f)) / (nearest * at.px), 16384.0f) + 1;
+        sums_t row = {{0.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 0.0f}}; /* rows first: less is lost to rounding */
+        for (int dx = -rx; dx <= rx; dx++)
+            gather(in, &at, dx, dy, mine, &row);
+        for (int c = 0; c < 3; c++) {
+            total.w[c] += row.w[c];
+            total.c[c] += row.c[c];
+        }
+    }
+    for (int c = 0; c < 3; c++)
+        out[c] = rl_select(out[c], total.c[c] / total.w[c], mine & (total.w[c] > 0.0f));
+}
+
+kernel void sss_reference_filter(global const float *diffuse, global const float *lit, global const float *albedo,
+                                 global const float *normal, global const float *depth, global const uint *stencil,
+                                 global float *area, global float *filtered, global float *color,
+                                 constant params_t *p, constant frame_t *f, constant material_t *materials)
+{
+    inputs_t in = {diffuse, depth, area, stencil, f};
+    vector_t v = scatter_vector(f);
+    intv id = rl_as_intv(rl_vload(0, stencil + v.at)), left = id != 0;
+    floatv out[3];
+    for (int c = 0; c < 3; c++)
+        out[c] = rl_vload(0, diffuse + c * f->plane4 + v.at);
+    while (scatter_any(left)) {
+        int m = scatter_max_int(id & left);
+        intv mine = id == m;
+        left &= ~mine;
+        if (materials[m].has_profile)
+            filter_material(&in, &v, m, &materials[m], mine, out);
+    }
+    for (int c = 0; c < 3; c++)
+        rl_vstore(out[c], 0, filtered + c * f->plane4 + v.at);
+}
+
+kernel void sss_reference_area(global const float *diffuse, global const float *lit, global const float *albedo,
+                               global const float *normal, global const float *depth, global const uint *stencil,
+                               global float *area, global float *filtered, global float *color,
+                               constant params_t *p, constant frame_t *f, constant material_t *materials)
+{
+#if P_weighting == WEIGHTING_AREA
+    scatter_area(depth, stencil, area, f);
+#endif
+}
+
+kernel void sss_reference_resolve(global const float *diffuse, global const float *lit, global const float *albedo,
+                                  global const float *normal, global const float *depth, global const uint *stencil,
+                                  global float *area, global float *filtered, global float *color,
+                                  constant params_t *p, constant frame_t *f, constant material_t *materials)
+{
+    scatter_resolve(filtered, lit, albedo, normal, stencil, color, f, materials);
+}

@@ -1,0 +1,48 @@
+/* Burley's normalized diffusion, on the host in double, and the rows that every pass reads which filters with
+ * it.
+ *
+ *     R(r) = s (e^{-sr} + e^{-sr/3}) / (8 pi r),  s = 1/d,   integral of 2 pi r R over r >= 0 is 1   [1/m²]
+ *
+ * Source: Christensen and Burley, "Approximate reflectance profiles for efficient subsurface scattering",
+ * 2015; Golubev, "Efficient screen-space subsurface scattering using Burley's normalized diffusion", SIGGRAPH
+ * 2018. Lengths are in any unit, the same for all arguments of a call. Pure functions. */
+#ifndef RL_PASSES_BURLEY_H
+#define RL_PASSES_BURLEY_H
+
+#include <stddef.h>
+
+#include "graph/model/pass.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Where the filters end: the radius in units of d within which 0.997 of the light comes out. */
+#define RL_BURLEY_REACH  0.997
+#define RL_BURLEY_RADIUS 16.5644
+
+/* Density an area at distance r > 0, d > 0. */
+double rl_burley_profile(double r, double d);
+
+/* The share of light that comes out within r >= 0: 1 - e^{-sr}/4 - 3/4 e^{-sr/3}. No cancellation near 0. */
+double rl_burley_cdf(double r, double d);
+
+/* r/d with rl_burley_cdf(r, d) = xi, xi in [0, 1); relative error below 1e-12 for xi in [1e-9, 1 - 1e-9].
+ * xi = 1 gives infinity. */
+double rl_burley_inverse(double xi);
+
+/* n taps on the golden spiral, importance-sampled, in units of d: tap i lies at (x[i], y[i]), its radius has
+ * CDF 0.997 (i + 1/2)/n, and weight[i] is 1/density, up to a factor that is the same for all taps. */
+void rl_burley_taps(size_t n, float *x, float *y, float *weight);
+
+/* The rows that the passes share; identical rows in several passes are one field of the material table. */
+#define RL_SCATTER_PROFILE_ROWS 3
+#define RL_SCATTER_SHADING_ROWS 2
+extern const rl_param
+    rl_scatter_profile_rows[RL_SCATTER_PROFILE_ROWS]; /* scatter_distance_mm texturing border */
+extern const rl_param rl_scatter_shading_rows[RL_SCATTER_SHADING_ROWS]; /* diffuse exit_transmission */
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,70 @@
+/* Direct light on the G-buffer: point, spot and directional lights, Lambert's or Disney's diffuse
+ * transmission, GGX specular, translucency through a slab.
+ *
+ * Golubev 2018 (transmission at entry and exit, texturing modes, thin and thick slabs), Helix (Beer-Lambert),
+ * Walter 2007 and Heitz 2014 (GGX, height-correlated Smith), Schlick 1994 (Fresnel). */
+#include "passes/shading_rows.h"
+
+static const rl_param profile_keys[] = {
+    RL_ROW_SCATTER_DISTANCE,
+    RL_ROW_TEXTURING,
+    M_ENUM(transmission, "none|thin|thick|beer_lambert", 0, "light that comes through from the back face",
+           .source = "Golubev 2018; Helix"),
+    M_ENUM(thickness_from, "max|layer|shadow", 0,
+           "thick, beer_lambert: the thickness layer, shadow_thickness along the normal, or the larger",
+           .source = "Golubev 2018"),
+    M(RL_RGBF, transmittance_color, 1e-6, 1, 0.5, "ratio",
+      "beer_lambert: what is left of white light after transmittance_distance_mm", .source = "Bavoil, Helix"),
+    M(RL_F32, transmittance_distance_mm, 1e-3, 1e6, 1, "mm", "beer_lambert: where transmittance_color holds"),
+};
+
+static const rl_param material_keys[] = {
+    M(RL_F32, roughness, 0, 1, -1, "ratio",
+      "perceptual roughness, alpha is its square; not given: the roughness layer, else 0.5",
+      .no_default = true),
+    M(RL_F32, specular, 0, 1, -1, "ratio",
+      "reflectance at normal incidence; not given: the specular layer, else 0.04", .no_default = true),
+    M(RL_F32, metallic, 0, 1, -1, "ratio",
+      "1: albedo is the specular colour and nothing is diffuse; not given: the metallic layer, else 0",
+      .no_default = true),
+};
+
+static const rl_param shading_keys[] = {
+    RL_ROW_DIFFUSE,
+    M_ENUM(specular, "ggx|none", 0, "the specular lobe", .source = "Walter 2007, Heitz 2014"),
+    M(RL_BOOL, transmission, 0, 1, 1, "", "false switches off the transmission that profiles ask for"),
+    RL_ROW_EXIT_TRANSMISSION,
+};
+
+static const rl_port ports[] = {
+    {"albedo", RL_READ, RL_RGB, .help = "0 to 1, scene-linear"},
+    {"normal", RL_READ, RL_NORMAL, .help = "shading normal"},
+    {"depth", RL_READ, RL_SCALAR, .help = "planar, metres"},
+    {"stencil", RL_READ, RL_ID, .help = "material"},
+    {"thickness", RL_READ, RL_SCALAR, .help = "metres along the inward normal, 0 = unknown",
+     .optional = true},
+    {"shadow", RL_READ, RL_LIGHTS, .help = "visibility of each light, 0 to 1", .optional = true},
+    {"shadow_thickness", RL_READ, RL_LIGHTS, .help = "metres along the light's ray, 0 where lit",
+     .optional = true},
+    {"roughness", RL_READ, RL_SCALAR, .help = "perceptual, 0 to 1", .optional = true},
+    {"specular", RL_READ, RL_SCALAR, .help = "reflectance at normal incidence, 0 to 1", .optional = true},
+    {"metallic", RL_READ, RL_SCALAR, .help = "0 to 1", .optional = true},
+    {"emission", RL_READ, RL_RGB, .help = "emitted radiance", .optional = true},
+    {"diffuse", RL_WRITE, RL_RGB, .help = "radiance that entered a subsurface material", .any_layout = true},
+    {"lit", RL_WRITE, RL_RGB, .help = "all other radiance, complete"},
+};
+
+static const rl_step steps[] = {{"lighting", .domain = RL_EVERY_VECTOR}};
+
+const rl_pass rl_pass_lighting = {
+    .name = "lighting",
+    .help = "direct light: diffuse transmission, specular reflection, translucency",
+    .source = "Golubev 2018; Helix; Walter 2007; Heitz 2014",
+    .kernel = "lighting.cl",
+    .profile_keys = RL_ARRAY(profile_keys),
+    .material_keys = RL_ARRAY(material_keys),
+    .shading_keys = RL_ARRAY(shading_keys),
+    .ports = RL_ARRAY(ports),
+    .steps = RL_ARRAY(steps),
+    .lights = true,
+};

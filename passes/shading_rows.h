@@ -1,0 +1,22 @@
+/* Rows of the material table that more than one pass reads. A row is the same wherever it is declared. */
+#ifndef RL_PASSES_SHADING_ROWS_H
+#define RL_PASSES_SHADING_ROWS_H
+
+#include "graph/model/pass.h"
+
+#define RL_ROW_SCATTER_DISTANCE                                                                              \
+    M(RL_RGBF, scatter_distance_mm, 1e-4, 1e4, 0, "mm",                                                      \
+      "scattering distance d = 1/s a channel, for Burley's profile",                                         \
+      .source = "Christensen and Burley 2015", .required = true)
+#define RL_ROW_TEXTURING                                                                                     \
+    M_ENUM(texturing, "post|pre_post", 0, "albedo on the way out, or its square root on both ways",          \
+           .source = "d'Eon 2007")
+#define RL_ROW_DIFFUSE                                                                                       \
+    M_ENUM(diffuse, "disney|lambert", 0, "how light crosses the surface, on the way in and on the way out",  \
+           .source = "Burley 2015")
+#define RL_ROW_EXIT_TRANSMISSION                                                                             \
+    M_ENUM(exit_transmission, "sss|lighting", 0,                                                             \
+           "where the way out is applied: behind the filter, or before it as in the talk",                   \
+           .source = "Golubev 2018")
+
+#endif

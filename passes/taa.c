@@ -1,0 +1,46 @@
+/* Temporal anti-aliasing: reproject the history, reject it where it shows something else, clip it to the
+ * colours around the pixel, blend. Static, jittered frames with blend 0 add up to their plain mean.
+ *
+ * Variance clipping: Salvi 2016. Closest motion, luminance weights: Karis 2014. Survey of the rest: Yang et
+ * al. 2020. */
+#include "graph/model/pass.h"
+
+typedef struct taa_params {
+    float blend;
+    float clip_gamma;
+} taa_params;
+
+static const rl_param params[] = {
+    P(taa_params, RL_F32, blend, 0, 1, 0.05, "ratio", "least weight of the current frame"),
+    P(taa_params, RL_F32, clip_gamma, 0, 8, 1, "stddev",
+      "half width of the colour box that the history is clipped to; doubled where nothing moves",
+      .source = "Salvi 2016"),
+};
+RL_PARAMS_MATCH(taa_params, 2);
+
+static const rl_port ports[] = {
+    {"color", RL_READ, RL_RGB, .help = "this frame, scene-linear"},
+    {"depth", RL_READ, RL_SCALAR, .help = "planar, metres"},
+    {"motion", RL_READ, RL_VEC2, .help = "pixels to the same point one frame before; else depth and cameras",
+     .optional = true},
+    {"stencil", RL_READ, RL_ID, .help = "material, to reject history of another", .optional = true},
+    {"last_color", RL_HISTORY, RL_RGB, .of = "color", .help = "the previous result"},
+    {"last_depth", RL_HISTORY, RL_SCALAR, .of = "depth", .help = "the previous depth"},
+    {"last_stencil", RL_HISTORY, RL_ID, .of = "stencil", .help = "the previous materials", .optional = true},
+    {"last_count", RL_HISTORY, RL_SCALAR, .of = "count", .help = "frames in the previous result"},
+    {"color", RL_WRITE, RL_RGB, .help = "anti-aliased, scene-linear"},
+    {"count", RL_WRITE, RL_SCALAR, .help = "frames that the pixel consists of, this one included"},
+};
+
+static const rl_step steps[] = {{"taa", .domain = RL_EVERY_VECTOR}};
+
+const rl_pass rl_pass_taa = {
+    .name = "taa",
+    .help = "temporal anti-aliasing with variance clipping",
+    .source = "Salvi 2016; Karis 2014; Yang et al. 2020",
+    .kernel = "taa.cl",
+    .params = RL_ARRAY(params),
+    .params_size = sizeof(taa_params),
+    .ports = RL_ARRAY(ports),
+    .steps = RL_ARRAY(steps),
+};

@@ -1,0 +1,436 @@
+/* See cl_pass.h. */
+#define CL_TARGET_OPENCL_VERSION 120
+#include "tests/cl_pass.h"
+
+#include <CL/cl.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "graph/base/alloc.h"
+#include "graph/base/text.h"
+
+#define KEPT    32
+#define OPTIONS "-cl-std=CL1.2 -cl-mad-enable -cl-no-signed-zeros -cl-finite-math-only"
+
+struct cl_session {
+    cl_device_id device;
+    cl_context context;
+    cl_command_queue queue;
+    struct {
+        char *text;
+        cl_program program;
+    } kept[KEPT];
+    int n_kept;
+};
+
+static bool failed(const char *what, cl_int code)
+{
+    if (code != CL_SUCCESS)
+        fprintf(stderr, "%s: OpenCL error %d\n", what, code);
+    return code != CL_SUCCESS;
+}
+
+cl_session *cl_open(int threads)
+{
+    cl_platform_id platforms[8];
+    cl_uint n = 0;
+    cl_device_id device = NULL;
+    if (clGetPlatformIDs(8, platforms, &n) != CL_SUCCESS)
+        return NULL;
+    for (cl_uint i = 0; i < n && !device; i++)
+        clGetDeviceIDs(platforms[i], CL_DEVICE_TYPE_CPU, 1, &device, NULL);
+    for (cl_uint i = 0; i < n && !device; i++)
+        clGetDeviceIDs(platforms[i], CL_DEVICE_TYPE_ALL, 1, &device, NULL);
+    if (!device)
+        return NULL;
+    if (threads > 0) {
+        cl_device_partition_property how[] = {CL_DEVICE_PARTITION_BY_COUNTS, threads,
+                                              CL_DEVICE_PARTITION_BY_COUNTS_LIST_END, 0};
+        cl_device_id part;
+        if (clCreateSubDevices(device, how, 1, &part, NULL) == CL_SUCCESS)
+            device = part;
+    }
+    cl_session *s = rl_calloc(1, sizeof *s);
+    if (!s)
+        return NULL;
+    cl_int code;
+    s->device = device;
+    s->context = clCreateContext(NULL, 1, &device, NULL, NULL, &code);
+    if (!failed("clCreateContext", code))
+        s->queue = clCreateCommandQueue(s->context, device, CL_QUEUE_PROFILING_ENABLE, &code);
+    if (failed("clCreateCommandQueue", code))
+        cl_close(&s);
+    return s;
+}
+
+void cl_close(cl_session **s)
+{
+    if (!*s)
+        return;
+    for (int i = 0; i < (*s)->n_kept; i++) {
+        clReleaseProgram((*s)->kept[i].program);
+        rl_free((*s)->kept[i].text);
+    }
+    if ((*s)->queue)
+        clReleaseCommandQueue((*s)->queue);
+    if ((*s)->context)
+        clReleaseContext((*s)->context);
+    clReleaseDevice((*s)->device);
+    rl_free(*s);
+    *s = NULL;
+}
+
+void cl_frame(frame_t *f, int x, int y, int width, int height, float focal)
+{
+    memset(f, 0, sizeof *f);
+    f->origin[0] = x & ~63;
+    f->origin[1] = y & ~3;
+    f->valid[0] = x - f->origin[0];
+    f->valid[1] = y - f->origin[1];
+    f->valid[2] = f->valid[0] + width;
+    f->valid[3] = f->valid[1] + height;
+    f->columns = (f->valid[2] + 63) & ~63;
+    f->rows = (f->valid[3] + 3) & ~3;
+    f->stride = f->columns;
+    f->plane = f->stride * f->rows;
+    f->stride4 = f->columns / 4 + 2 * RL_MARGIN4;
+    f->plane4 = f->stride4 * (f->rows / 4) * 16;
+    f->number = 1;
+    for (int i = 0; i < 3; i++)
+        f->camera.to_view[5 * i] = f->camera.to_world[5 * i] = 1;
+    f->camera.focal[0] = f->camera.focal[1] = focal;
+    f->camera.centre[0] = (float)x + 0.5f * (float)width;
+    f->camera.centre[1] = (float)y + 0.5f * (float)height;
+}
+
+/* ---- images in both layouts ---- */
+
+static int planes_of(rl_format format)
+{
+    return format == RL_RGB || format == RL_NORMAL ? 3 : format == RL_VEC2 ? 2 : 1;
+}
+
+static size_t place(const frame_t *f, rl_layout layout, int plane, int x, int y)
+{
+    if (layout == RL_LINEAR)
+        return (size_t)(RL_GUARD + plane * f->plane + y * f->stride + x);
+    int s = (y & 3) * 4 + (x & 3);
+    return (size_t)(plane * f->plane4 + (s * (f->rows >> 2) + (y >> 2)) * f->stride4 + RL_MARGIN4 + (x >> 2));
+}
+
+static size_t floats_of(const frame_t *f, const rl_port *port)
+{
+    int n = planes_of(port->format);
+    return (size_t)(port->layout == RL_LINEAR ? n * f->plane + 2 * RL_GUARD : n * f->plane4);
+}
+
+static void move_image(const frame_t *f, const rl_port *port, float *device, const void *from, float *to)
+{
+    for (int p = 0; p < planes_of(port->format); p++)
+        for (int y = 0; y < f->rows; y++)
+            for (int x = 0; x < f->columns; x++) {
+                size_t host = ((size_t)p * (size_t)f->rows + (size_t)y) * (size_t)f->columns + (size_t)x;
+                size_t at = place(f, port->layout, p, x, y);
+                if (from)
+                    memcpy(&device[at], (const float *)from + host, 4);
+                else
+                    to[host] = device[at];
+            }
+}
+
+static const cl_image *image_of(const cl_job *job, const rl_port *port)
+{
+    for (size_t i = 0; i < job->n_images; i++)
+        if (!strcmp(job->images[i].port, port->name) &&
+            (port->role == RL_READ ? !job->images[i].write : !!job->images[i].write))
+            return &job->images[i];
+    return NULL;
+}
+
+/* Whatever a kernel may not rely on is NaN: margins, guards and scratch. */
+static float *make_plane(const cl_job *job, const rl_port *port)
+{
+    const cl_image *image = image_of(job, port);
+    if (port->role == RL_READ && !(image && image->read))
+        return NULL;
+    size_t n = floats_of(job->frame, port);
+    float *data = rl_aligned(n * 4);
+    if (!data)
+        return NULL;
+    for (size_t i = 0; i < n; i++)
+        data[i] = NAN;
+    if (port->format == RL_ID)
+        memset(data, 0, n * 4);
+    if (port->role == RL_READ)
+        move_image(job->frame, port, data, image->read, NULL);
+    return data;
+}
+
+/* ---- programs ---- */
+
+static void add_fields(rl_str *s, const rl_params *rows, const char *group)
+{
+    for (size_t i = 0; i < rows->n; i++) {
+        const rl_param *r = &rows->rows[i];
+        const char *type = r->type == RL_F32 || r->type == RL_RGBF ? "float" : "int";
+        rl_str_printf(s, "    %s %s%s%s%s;\n", type, group, *group ? "_" : "", r->name,
+                      r->type == RL_RGBF ? "[3]" : "");
+    }
+}
+
+static void add_words(rl_str *s, const rl_param *row, const void *params)
+{
+    int32_t v;
+    memcpy(&v, (const char *)params + row->offset, 4);
+    rl_str_printf(s, "#define P_%s %d\n", row->name, v);
+}
+
+char *cl_read_file(const char *path)
+{
+    FILE *file = fopen(path, "rb");
+    if (!file) {
+        fprintf(stderr, "%s: cannot be read (run from the project's folder)\n", path);
+        return NULL;
+    }
+    char *text = NULL;
+    if (fseek(file, 0, SEEK_END) == 0) {
+        long size = ftell(file);
+        rewind(file);
+        text = size >= 0 ? rl_malloc((size_t)size + 1) : NULL;
+        if (text)
+            text[fread(text, 1, (size_t)size, file)] = 0;
+    }
+    fclose(file);
+    return text;
+}
+
+static bool add_file(rl_str *s, const char *name)
+{
+    char path[256];
+    snprintf(path, sizeof path, "kernels/%s", name);
+    char *text = cl_read_file(path);
+    if (!text)
+        return false;
+    rl_str_printf(s, "\n#line 1 \"%s\"\n%s", path, text);
+    rl_free(text);
+    return true;
+}
+
+static int width_of(const cl_job *job)
+{
+    return job->width ? job->width : 16;
+}
+
+static bool program_text(const cl_job *job, rl_str *s)
+{
+    const rl_pass *pass = job->pass;
+    bool ok = add_file(s, "shared.h");
+    rl_str_printf(s, "#define RL_W %d\n", width_of(job));
+    rl_str_printf(s, "typedef struct params_t {\n");
+    add_fields(s, &pass->params, "");
+    rl_str_printf(s, "} params_t;\ntypedef struct material_t {\n    int has_profile;\n");
+    add_fields(s, &pass->profile_keys, "profile");
+    add_fields(s, &pass->material_keys, "material");
+    add_fields(s, &pass->shading_keys, "shading");
+    rl_str_printf(s, "} material_t;\n");
+    for (size_t i = 0; i < pass->params.n; i++)
+        if (pass->params.rows[i].structural)
+            add_words(s, &pass->params.rows[i], job->params);
+    for (size_t i = 0; i < pass->ports.n; i++) {
+        const rl_port *port = &pass->ports.rows[i];
+        const cl_image *image = image_of(job, port);
+        rl_str_printf(s, "#define HAS_%s %d\n#define LAYOUT_%s %d\n", port->name, image && image->read,
+                      port->name, port->layout);
+    }
+    ok = ok && add_file(s, "common.cl");
+    if (pass->kernel_prelude)
+        ok = ok && add_file(s, pass->kernel_prelude);
+    return ok && add_file(s, pass->kernel) && !s->failed;
+}
+
+static cl_program build(cl_session *s, const char *text)
+{
+    for (int i = 0; i < s->n_kept; i++)
+        if (!strcmp(s->kept[i].text, text))
+            return s->kept[i].program;
+    cl_int code;
+    cl_program program = clCreateProgramWithSource(s->context, 1, &text, NULL, &code);
+    if (failed("clCreateProgramWithSource", code))
+        return NULL;
+    code = clBuildProgram(program, 1, &s->device, OPTIONS, NULL, NULL);
+    char log[8192] = "";
+    clGetProgramBuildInfo(program, s->device, CL_PROGRAM_BUILD_LOG, sizeof log - 1, log, NULL);
+    if (code != CL_SUCCESS || strstr(log, "warning:"))
+        fprintf(stderr, "%s\n", log);
+    char *copy = rl_strdup(text);
+    if (failed("clBuildProgram", code) || s->n_kept == KEPT || !copy) {
+        rl_free(copy);
+        clReleaseProgram(program);
+        return NULL;
+    }
+    s->kept[s->n_kept].text = copy;
+    s->kept[s->n_kept++].program = program;
+    return program;
+}
+
+/* ---- running ---- */
+
+typedef struct cl_args {
+    cl_mem mem[32];
+    cl_uint n;
+} cl_args;
+
+static bool add_buffer(cl_session *s, cl_args *a, void *data, size_t bytes)
+{
+    cl_int code = CL_SUCCESS;
+    a->mem[a->n++] =
+        data ? clCreateBuffer(s->context, CL_MEM_READ_WRITE | CL_MEM_USE_HOST_PTR, bytes, data, &code) : NULL;
+    return !failed("clCreateBuffer", code);
+}
+
+static double run_kernel(cl_session *s, cl_kernel kernel, cl_uint dims, const size_t *global,
+                         const size_t *local)
+{
+    cl_event event;
+    cl_ulong begin = 0, end = 0;
+    if (failed("clEnqueueNDRangeKernel",
+               clEnqueueNDRangeKernel(s->queue, kernel, dims, NULL, global, local, 0, NULL, &event)))
+        return -1;
+    clWaitForEvents(1, &event);
+    clGetEventProfilingInfo(event, CL_PROFILING_COMMAND_START, sizeof begin, &begin, NULL);
+    clGetEventProfilingInfo(event, CL_PROFILING_COMMAND_END, sizeof end, &end, NULL);
+    clReleaseEvent(event);
+    return (double)(end - begin) * 1e-6;
+}
+
+static double run_step(cl_session *s, const cl_job *job, cl_program program, const rl_step *step,
+                       const cl_args *args)
+{
+    const frame_t *f = job->frame;
+    cl_int code;
+    cl_kernel kernel = clCreateKernel(program, step->entry, &code);
+    if (failed(step->entry, code))
+        return -1;
+    double ms = -1;
+    for (cl_uint i = 0; i < args->n; i++)
+        if (failed(step->entry, clSetKernelArg(kernel, i, sizeof(cl_mem), &args->mem[i])))
+            goto done;
+    size_t columns = (size_t)f->columns, rows = (size_t)f->rows, width = (size_t)width_of(job);
+    if (step->domain == RL_EVERY_PHASE)
+        ms = run_kernel(s, kernel, 3, (size_t[]){16, columns / (4 * width), rows / 4}, (size_t[]){16, 1, 1});
+    else if (step->domain == RL_EVERY_VECTOR)
+        ms = run_kernel(s, kernel, 2, (size_t[]){columns / width, rows}, (size_t[]){4, 1});
+    else
+        ms = run_kernel(s, kernel, 2, (size_t[]){columns, rows}, (size_t[]){64, 1});
+done:
+    clReleaseKernel(kernel);
+    return ms;
+}
+
+static bool run_steps(cl_session *s, const cl_job *job, cl_program program, const cl_args *args)
+{
+    const rl_pass *pass = job->pass;
+    for (size_t i = 0; i < pass->steps.n; i++)
+        for (int again = 0; again < (job->repeat > 1 ? job->repeat : 1); again++) {
+            double ms = run_step(s, job, program, &pass->steps.rows[i], args);
+            if (ms < 0)
+                return false;
+            if (job->ms && (again == 0 || ms < job->ms[i]))
+                job->ms[i] = ms;
+        }
+    return true;
+}
+
+bool cl_run(cl_session *s, const cl_job *job)
+{
+    const rl_pass *pass = job->pass;
+    float *planes[24] = {NULL};
+    cl_args args = {.n = 0};
+    rl_arena arena = {0};
+    rl_str text = {0};
+    rl_tables tables = {0};
+    frame_t frame = *job->frame;
+    bool ok = pass->ports.n <= 24 && program_text(job, &text);
+    cl_program program = ok ? build(s, text.text) : NULL;
+    ok = program != NULL;
+    for (size_t i = 0; ok && i < pass->ports.n; i++) {
+        const rl_port *port = &pass->ports.rows[i];
+        planes[i] = make_plane(job, port);
+        ok =
+            (planes[i] || port->optional) && add_buffer(s, &args, planes[i], floats_of(job->frame, port) * 4);
+        if (port->layout == RL_LINEAR && ok && planes[i]) { /* the kernel's pointer is behind the guard */
+            cl_buffer_region region = {RL_GUARD * 4, (floats_of(job->frame, port) - RL_GUARD) * 4};
+            cl_int code;
+            cl_mem part =
+                clCreateSubBuffer(args.mem[args.n - 1], 0, CL_BUFFER_CREATE_TYPE_REGION, &region, &code);
+            ok = !failed("clCreateSubBuffer", code);
+            clReleaseMemObject(args.mem[args.n - 1]);
+            args.mem[args.n - 1] = part;
+        }
+    }
+    if (ok && pass->tables) {
+        rl_error err = {0};
+        ok = pass->tables(&(rl_pass_input){.params = job->params}, &arena, &tables, &err) == RL_OK;
+    }
+    ok = ok && (!pass->params.n || add_buffer(s, &args, (void *)(uintptr_t)job->params, pass->params_size));
+    ok = ok && add_buffer(s, &args, &frame, sizeof frame);
+    ok = ok && add_buffer(s, &args, (void *)(uintptr_t)job->materials, job->materials_bytes);
+    ok = ok && (!pass->tables || add_buffer(s, &args, tables.data, tables.n * 4));
+    ok = ok && run_steps(s, job, program, &args);
+    for (size_t i = 0; ok && i < pass->ports.n; i++) {
+        const rl_port *port = &pass->ports.rows[i];
+        const cl_image *image = image_of(job, port);
+        if (port->role == RL_READ || !image)
+            continue;
+        size_t skip = port->layout == RL_LINEAR ? RL_GUARD * 4 : 0, bytes = floats_of(job->frame, port) * 4;
+        ok = !failed("clEnqueueReadBuffer",
+                     clEnqueueReadBuffer(s->queue, args.mem[i], CL_TRUE, 0, bytes - skip,
+                                         (char *)planes[i] + skip, 0, NULL, NULL));
+        move_image(job->frame, port, planes[i], NULL, image->write);
+    }
+    for (cl_uint i = 0; i < args.n; i++)
+        if (args.mem[i])
+            clReleaseMemObject(args.mem[i]);
+    for (size_t i = 0; i < 24; i++)
+        rl_free(planes[i]);
+    rl_arena_free(&arena);
+    rl_str_free(&text);
+    return ok;
+}
+
+double cl_run_text(cl_session *s, const char *text, const char *entry, const cl_buffer *buffers, size_t n,
+                   const size_t global[2], const size_t local[2], int repeat)
+{
+    cl_args args = {.n = 0};
+    double best = -1;
+    cl_int code;
+    cl_kernel kernel = NULL;
+    cl_program program = build(s, text);
+    if (!program)
+        return -1;
+    kernel = clCreateKernel(program, entry, &code);
+    if (failed(entry, code))
+        return -1;
+    for (size_t i = 0; i < n; i++)
+        if (!add_buffer(s, &args, buffers[i].data, buffers[i].bytes) ||
+            failed("clSetKernelArg", clSetKernelArg(kernel, (cl_uint)i, sizeof(cl_mem), &args.mem[i])))
+            goto done;
+    for (int again = 0; again < repeat; again++) {
+        double ms = run_kernel(s, kernel, 2, global, local);
+        if (ms < 0)
+            goto done;
+        best = again == 0 || ms < best ? ms : best;
+    }
+    for (size_t i = 0; i < n; i++)
+        if (buffers[i].write && failed("clEnqueueReadBuffer",
+                                       clEnqueueReadBuffer(s->queue, args.mem[i], CL_TRUE, 0,
+                                                           buffers[i].bytes, buffers[i].data, 0, NULL, NULL)))
+            best = -1;
+done:
+    for (cl_uint i = 0; i < args.n; i++)
+        if (args.mem[i])
+            clReleaseMemObject(args.mem[i]);
+    clReleaseKernel(kernel);
+    return best;
+}

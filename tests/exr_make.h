@@ -1,0 +1,47 @@
+/* For the EXR tests: files written and read by OpenEXR's core with its own default pipelines, to be held
+ * against ours. */
+#ifndef RL_TESTS_EXR_MAKE_H
+#define RL_TESTS_EXR_MAKE_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "graph/run/exr.h"
+
+typedef struct made_channel {
+    const char *name; /* in alphabetical order */
+    rl_exr_pixel type;
+    int sampling;       /* on both axes; 0 means 1 */
+    const void *pixels; /* of that type (half: its bits), rows without gaps */
+} made_channel;
+
+typedef struct made_part {
+    const char *name; /* NULL in a file of one part */
+    int x0, y0, width, height;
+    rl_exr_compression compression;
+    int tile;    /* side of a tile; 0 = scanlines */
+    bool mipmap; /* all levels; those above 0 hold zeros */
+    bool deep;   /* header only */
+    const made_channel *channels;
+    int n_channels;
+} made_part;
+
+/* Fails the running test when the core refuses. */
+void made_write(const char *path, const made_part *parts, int n_parts);
+
+/* The pixels of a channel of a scanline file in the channel's own type, rows without gaps. */
+void made_read(const char *path, int part, const char *channel, void *out);
+
+/* A folder for this test program, made on first use; made_clean removes it and the files in it. */
+const char *made_path(const char *name);
+void made_clean(void);
+/* How many files are in it. */
+int made_count(void);
+
+/* Deterministic noise. */
+uint32_t made_random(uint32_t *state);
+
+uint16_t made_half(float f); /* to nearest, by the portable kernel */
+
+#endif

@@ -1,0 +1,275 @@
+/* See sss_twin.h. */
+#include "tests/sss_twin.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "graph/base/alloc.h"
+#include "passes/burley.h"
+
+static const double pi = 3.14159265358979323846;
+
+static long at(const twin_scene *s, int x, int y)
+{
+    return (long)y * s->frame.columns + x;
+}
+
+static long plane(const twin_scene *s)
+{
+    return (long)s->frame.columns * s->frame.rows;
+}
+
+/* 0 outside of the image. */
+static uint32_t material_at(const twin_scene *s, int x, int y)
+{
+    const int *v = s->frame.valid;
+    return x < v[0] || y < v[1] || x >= v[2] || y >= v[3] ? 0 : s->stencil[at(s, x, y)];
+}
+
+/* ---- the way out ---- */
+
+void twin_resolve(const twin_scene *s, int x, int y, const double filtered[3], double color[3])
+{
+    const frame_t *f = &s->frame;
+    const camera_t *c = &f->camera;
+    const twin_material *m = &s->materials[s->stencil[at(s, x, y)]];
+    double ray[3] = {(x + f->origin[0] + 0.5 + c->jitter[0] - c->centre[0]) / c->focal[0],
+                     -(y + f->origin[1] + 0.5 + c->jitter[1] - c->centre[1]) / c->focal[1], -1};
+    double dot = 0, length = sqrt(ray[0] * ray[0] + ray[1] * ray[1] + 1);
+    for (int i = 0; i < 3; i++) {
+        const float *row = c->to_world + 4 * i;
+        dot -= s->normal[i * plane(s) + at(s, x, y)] * (row[0] * ray[0] + row[1] * ray[1] + row[2] * ray[2]) /
+               length;
+    }
+    double out = 1;
+    if (m->diffuse == 0 && m->exit_transmission == 0)
+        out = 1 - 0.5 * pow(1 - fmin(fabs(dot), 1), 5);
+    for (int i = 0; i < 3; i++) {
+        double a = s->albedo[i * plane(s) + at(s, x, y)];
+        color[i] = s->lit[i * plane(s) + at(s, x, y)];
+        if (m->has_profile)
+            color[i] += filtered[i] * (m->texturing ? sqrt(a) : a) * out;
+    }
+}
+
+/* ---- the surface that a pixel sees ---- */
+
+static double slope(const twin_scene *s, int x, int y, int dx, int dy)
+{
+    uint32_t id = material_at(s, x, y);
+    float z = s->depth[at(s, x, y)];
+    double best = 0;
+    bool have = false;
+    for (int sign = 1; sign >= -1; sign -= 2) {
+        int nx = x + sign * dx, ny = y + sign * dy;
+        if (material_at(s, nx, ny) != id)
+            continue;
+        double d = (double)sign * (double)(s->depth[at(s, nx, ny)] - z);
+        if (!have || fabs(d) < fabs(best))
+            best = d;
+        have = true;
+    }
+    return best;
+}
+
+/* Slopes of the disk, depth a metre of the screen's plane. In float: they decide where taps land. */
+static void tilt(const twin_scene *s, int x, int y, float t[2])
+{
+    const camera_t *c = &s->frame.camera;
+    float z = s->depth[at(s, x, y)];
+    for (int i = 0; i < 2; i++) {
+        t[i] = (float)slope(s, x, y, i == 0, i == 1) * (c->focal[i] / z);
+        t[i] = s->tangent ? fminf(fmaxf(t[i], -10), 10) : 0;
+    }
+}
+
+/* |dP/dx × dP/dy| of the view-space point. */
+static double area_of(const twin_scene *s, int x, int y)
+{
+    const frame_t *f = &s->frame;
+    const camera_t *c = &f->camera;
+    if (!s->area)
+        return 1;
+    double z = s->depth[at(s, x, y)], zx = slope(s, x, y, 1, 0), zy = slope(s, x, y, 0, 1);
+    double rx = (x + f->origin[0] + 0.5 + c->jitter[0] - c->centre[0]) / c->focal[0];
+    double ry = -(y + f->origin[1] + 0.5 + c->jitter[1] - c->centre[1]) / c->focal[1];
+    double a[3] = {z / c->focal[0] + rx * zx, ry * zx, -zx},
+           b[3] = {rx * zy, -z / c->focal[1] + ry * zy, -zy};
+    double n[3] = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+    return sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+}
+
+/* ---- the dense sum ---- */
+
+#define NODES 12
+
+/* Gauss-Legendre on [-1/2, 1/2], by Newton's method on the Legendre polynomial. */
+static void legendre(double x[NODES], double w[NODES])
+{
+    for (int i = 0; i < NODES; i++) {
+        double t = cos(pi * (i + 0.75) / (NODES + 0.5)), slope_here = 1;
+        for (int step = 0; step < 50; step++) {
+            double p0 = 1, p1 = t;
+            for (int k = 2; k <= NODES; k++) {
+                double p2 = ((2 * k - 1) * t * p1 - (k - 1) * p0) / k;
+                p0 = p1;
+                p1 = p2;
+            }
+            slope_here = NODES * (t * p1 - p0) / (t * t - 1);
+            t -= p1 / slope_here;
+        }
+        x[i] = t / 2;
+        w[i] = 1 / ((1 - t * t) * slope_here * slope_here);
+    }
+}
+
+/* The light that the pixel (dx, dy) away, of size hx × hy, sends here; dz: its difference in depth. */
+static double pixel_weight(int dx, int dy, double hx, double hy, double dz, double d)
+{
+    static double x[NODES], w[NODES];
+    if (w[0] == 0)
+        legendre(x, w);
+    if (dx == 0 && dy == 0)
+        return rl_burley_cdf(sqrt(hx * hy / pi), d);
+    if (dx < -2 || dx > 2 || dy < -2 || dy > 2)
+        return rl_burley_profile(sqrt(dx * dx * hx * hx + dy * dy * hy * hy + dz * dz), d) * hx * hy;
+    double sum = 0;
+    for (int j = 0; j < NODES; j++)
+        for (int i = 0; i < NODES; i++) {
+            double u = (dx + x[i]) * hx, v = (dy + x[j]) * hy;
+            sum += w[i] * w[j] * rl_burley_profile(sqrt(u * u + v * v + dz * dz), d);
+        }
+    return sum * hx * hy;
+}
+
+void twin_reference(const twin_scene *s, int x, int y, double filtered[3])
+{
+    const camera_t *c = &s->frame.camera;
+    uint32_t id = s->stencil[at(s, x, y)];
+    const twin_material *m = &s->materials[id];
+    double z = s->depth[at(s, x, y)], hx = z / c->focal[0], hy = z / c->focal[1], d[3], most = 0;
+    double own = area_of(s, x, y), sum[3] = {0}, weights[3] = {0};
+    for (int i = 0; i < 3; i++) {
+        d[i] = m->scatter_distance_mm[i] * 1e-3;
+        most = fmax(most, d[i]);
+    }
+    double reach = RL_BURLEY_RADIUS * most;
+    float t[2];
+    tilt(s, x, y, t);
+    int rx = (int)(reach / hx) + 1, ry = (int)(reach / hy) + 1;
+    for (int dy = -ry; dy <= ry; dy++)
+        for (int dx = -rx; dx <= rx; dx++) {
+            if (hypot(hypot(dx * hx, dy * hy), (double)t[0] * dx * hx + (double)t[1] * dy * hy) > reach)
+                continue;
+            bool same = material_at(s, x + dx, y + dy) == id;
+            if (!same && m->border == 0)
+                continue;
+            double dz = same ? s->depth[at(s, x + dx, y + dy)] - z : 0;
+            double area = same ? area_of(s, x + dx, y + dy) : own;
+            for (int i = 0; i < 3; i++) {
+                double w = pixel_weight(dx, dy, hx, hy, dz, d[i]) * area;
+                weights[i] += w;
+                if (same)
+                    sum[i] += w * s->diffuse[i * plane(s) + at(s, x + dx, y + dy)];
+            }
+        }
+    for (int i = 0; i < 3; i++)
+        filtered[i] = sum[i] / weights[i];
+}
+
+/* ---- taps ---- */
+
+/* The scale of the taps for pixel (x, y), a depth, and the mean slopes of their disk: of the lanes of its
+ * vector (64 columns, one phase) with its material, groups are split off from the far end. In float, as the
+ * scale decides where taps land. */
+static float group_of(const twin_scene *s, int x, int y, float slopes[2])
+{
+    uint32_t id = s->stencil[at(s, x, y)];
+    float z = s->depth[at(s, x, y)], beyond = INFINITY;
+    for (;;) {
+        float far = 0, near = INFINITY;
+        for (int i = 0, px = (x & ~63) + (x & 3); i < 16; i++, px += 4)
+            if (material_at(s, px, y) == id && s->depth[at(s, px, y)] < beyond)
+                far = fmaxf(far, s->depth[at(s, px, y)]);
+        float limit = 0.8f * far, t[2];
+        long count = 0, sum[2] = {0};
+        for (int i = 0, px = (x & ~63) + (x & 3); i < 16; i++, px += 4) {
+            float pz = s->depth[at(s, px, y)];
+            if (material_at(s, px, y) == id && pz < beyond && pz >= limit) {
+                near = fminf(near, pz);
+                tilt(s, px, y, t);
+                sum[0] += lrint((double)t[0] * 1024);
+                sum[1] += lrint((double)t[1] * 1024);
+                count++;
+            }
+        }
+        if (z >= limit) {
+            slopes[0] = (float)sum[0] / (1024.0f * (float)count);
+            slopes[1] = (float)sum[1] / (1024.0f * (float)count);
+            return 0.5f * (far + near);
+        }
+        beyond = limit;
+    }
+}
+
+static uint32_t hash(uint32_t a)
+{
+    uint32_t h = a * 0x9E3779B1u;
+    h ^= h >> 15;
+    h *= 0x2C1B3C6Du;
+    h ^= h >> 12;
+    h *= 0x297A2D39u;
+    return h ^ (h >> 15);
+}
+
+static int turn_of(const twin_scene *s, int x, int y, int seed)
+{
+    static const int order[4][4] = {
+        {0,  8,  2,  10},
+        {12, 4,  14, 6 },
+        {3,  11, 1,  9 },
+        {15, 7,  13, 5 }
+    };
+    return (order[y & 3][x & 3] * 16 + s->frame.number * 97 + (int)(hash((uint32_t)seed) >> 24)) & 255;
+}
+
+void twin_burley(const twin_scene *s, int x, int y, int n, bool turn, int seed, double filtered[3])
+{
+    const camera_t *c = &s->frame.camera;
+    uint32_t id = s->stencil[at(s, x, y)];
+    const twin_material *m = &s->materials[id];
+    const float *d = m->scatter_distance_mm;
+    float t[2], most = fmaxf(d[0], fmaxf(d[1], d[2])), middle = group_of(s, x, y, t), inv_d = 1e3f / most;
+    float slope2 = fmaf(t[0], t[0], t[1] * t[1]);
+    float less = slope2 > 0 ? (1.0f / sqrtf(1.0f + slope2) - 1.0f) / slope2 : 0;
+    float xx = less * t[0] * t[0], xy = less * t[0] * t[1], yy = less * t[1] * t[1];
+    float kx = c->focal[0] / (middle * inv_d), ky = c->focal[1] / (middle * inv_d);
+    int which = turn ? turn_of(s, x, y, seed) : 0;
+    float co = (float)cos(2 * pi * which / 256), si = (float)sin(2 * pi * which / 256);
+    double z = s->depth[at(s, x, y)], scale = z / middle, own = area_of(s, x, y), sum[3] = {0},
+           weights[3] = {0};
+    float *tx = rl_malloc((size_t)n * 12), *ty = tx + n, *tw = ty + n;
+    rl_burley_taps((size_t)n, tx, ty, tw);
+    for (int i = 0; i < n; i++) {
+        float u = fmaf(tx[i], co, -(ty[i] * si)), v = fmaf(tx[i], si, ty[i] * co);
+        float x_disk = u;
+        u = fmaf(v, xy, fmaf(u, xx, u));
+        v = fmaf(x_disk, xy, fmaf(v, yy, v));
+        int px = x + (int)nearbyint((double)u * kx), py = y + (int)nearbyint((double)v * ky);
+        bool same = material_at(s, px, py) == id;
+        if (!same && m->border == 0)
+            continue;
+        double dz = same ? (s->depth[at(s, px, py)] - z) / (most * 1e-3) : 0;
+        double r = sqrt(((double)u * u + (double)v * v) * scale * scale + dz * dz);
+        double area = same ? area_of(s, px, py) / own : 1;
+        for (int k = 0; k < 3; k++) {
+            double w = rl_burley_profile(r, d[k] / most) * 8 * pi * (d[k] / most) * tw[i] * area;
+            weights[k] += w;
+            if (same)
+                sum[k] += w * s->diffuse[k * plane(s) + at(s, px, py)];
+        }
+    }
+    for (int k = 0; k < 3; k++)
+        filtered[k] = weights[k] > 1e-12 ? sum[k] / weights[k] : s->diffuse[k * plane(s) + at(s, x, y)];
+    rl_free(tx);
+}

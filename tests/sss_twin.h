@@ -1,0 +1,39 @@
+/* The scattering passes in plain C and double precision, one pixel at a time: what the kernels are checked
+ * against. */
+#ifndef RL_TESTS_SSS_TWIN_H
+#define RL_TESTS_SSS_TWIN_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "kernels/shared.h"
+
+/* Equal to material_t of the sss passes: has_profile, their profile rows, their shading rows. */
+typedef struct twin_material {
+    int32_t has_profile;
+    float scatter_distance_mm[3];
+    int32_t texturing, border;
+    int32_t diffuse, exit_transmission;
+} twin_material;
+
+/* Host images in buffer coordinates, planes of columns × rows. */
+typedef struct twin_scene {
+    frame_t frame;
+    const twin_material *materials;
+    const float *diffuse, *lit, *albedo, *normal, *depth;
+    const uint32_t *stencil;
+    bool area;    /* weighting: area */
+    bool tangent; /* orientation: tangent */
+} twin_scene;
+
+/* lit + filtered · exit · F_out at pixel (x, y), from the filtered radiance. */
+void twin_resolve(const twin_scene *s, int x, int y, const double filtered[3], double color[3]);
+
+/* The dense sum. */
+void twin_reference(const twin_scene *s, int x, int y, double filtered[3]);
+
+/* n taps (n > 0), the vector's common scale and the phase's turn as the kernel has them; `turn`: rotation on.
+ */
+void twin_burley(const twin_scene *s, int x, int y, int n, bool turn, int seed, double filtered[3]);
+
+#endif

@@ -1,0 +1,607 @@
+/* The commands: what they print, what they leave behind, their exit statuses. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <cmocka.h>
+
+#include <jansson.h>
+#include <limits.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "graph/model/pass.h"
+#include "graph/relit.h"
+#include "tests/tool_run.h"
+
+static char capture[PATH_MAX]; /* captures/monkey */
+static char program[PATH_MAX]; /* relit itself, beside the tests */
+
+static const char pipeline[] =
+    "relit: 1\n"
+    "profiles: {skin: {scatter_distance_mm: [3, 1.2, 0.7]}}\n"
+    "materials: {skin: {profile: skin}, default: {}}\n"
+    "graph:\n"
+    "  light: {pass: lighting}\n"
+    "  sss: {pass: sss_burley, in: {diffuse: light.diffuse, lit: light.lit}, taps: 21}\n"
+    "  spare: {pass: combine, in: {diffuse: light.diffuse, lit: light.lit}}\n"
+    "outputs:\n"
+    "  beauty: {image: sss.color, file: \"{capture}.{frame:04}.exr\"}\n";
+
+/* A folder with the pipeline; `pipe` is its path. Both are given back to leave(). */
+static char *enter(char **pipe)
+{
+    char *folder = folder_new();
+    file_write(folder, "p.yaml", pipeline, strlen(pipeline));
+    *pipe = path_in(folder, "p.yaml");
+    return folder;
+}
+
+static void leave(char *folder, char *pipe)
+{
+    free(pipe);
+    folder_remove(folder);
+}
+
+#define RUN(...) tool_run((const char *const[]){__VA_ARGS__, NULL})
+
+static void expect(const tool_result *r, int status)
+{
+    if (r->status != status)
+        print_error("status %d instead of %d\n%s%s\n", r->status, status, r->out, r->err);
+    assert_int_equal(r->status, status);
+}
+
+static int lines(const char *text)
+{
+    int n = 0;
+    for (const char *c = text; *c; c++)
+        n += *c == '\n';
+    return n;
+}
+
+/* ---- help ------------------------------------------------------------------------------------------------
+ */
+
+static const char *const commands[] = {"run", "check", "plan", "init", "inspect", "passes", "devices"};
+
+static void expect_narrow(const char *text)
+{
+    for (const char *at = text; *at; at += strcspn(at, "\n") + 1) {
+        if (strcspn(at, "\n") > 80)
+            print_error("over 80 columns: %.*s\n", (int)strcspn(at, "\n"), at);
+        assert_true(strcspn(at, "\n") <= 80);
+        assert_true(strcspn(at, "\n") == 0 || at[strcspn(at, "\n") - 1] != ' ');
+    }
+}
+
+static void test_help(void **state)
+{
+    (void)state;
+    tool_result r = RUN("--help");
+    expect(&r, 0);
+    expect_narrow(r.out);
+    assert_string_equal(r.err, "");
+    for (size_t i = 0; i < sizeof commands / sizeof *commands; i++) {
+        char line[32];
+        snprintf(line, sizeof line, "\n  %s", commands[i]);
+        assert_non_null(strstr(r.out, line));
+        tool_result one = RUN(commands[i], "--help");
+        expect(&one, 0);
+        expect_narrow(one.out);
+        assert_non_null(strstr(one.out, "--help"));
+        assert_true(!strstr(one.out, "--frames") == (i > 2)); /* only run, check and plan take frames */
+        tool_result_free(&one);
+    }
+    assert_null(strstr(r.out, "bench"));
+    tool_result_free(&r);
+}
+
+static void test_version(void **state)
+{
+    (void)state;
+    tool_result r = RUN("--version");
+    expect(&r, 0);
+    assert_string_equal(r.out, "relit " RL_VERSION "\n");
+    tool_result_free(&r);
+}
+
+/* ---- the command line ------------------------------------------------------------------------------------
+ */
+
+typedef struct usage_row {
+    const char *arguments[6];
+    const char *says;
+} usage_row;
+
+static void test_usage(void **state)
+{
+    (void)state;
+    static const usage_row rows[] = {
+        {{NULL}, "needs a command"},
+        {{"rum", "p"}, "did you mean 'run'?"},
+        {{"run"}, "needs a PIPELINE"},
+        {{"run", "p", "q"}, "takes one PIPELINE, found 'p' and 'q'"},
+        {{"devices", "x"}, "takes no argument"},
+        {{"run", "p", "-v"}, "there is no option '-v'"},
+        {{"run", "p", "--frames"}, "'--frames' needs SPEC"},
+        {{"run", "p", "--frames", "--quiet"}, "'--frames' needs SPEC"},
+        {{"run", "p", "--quiet=yes"}, "takes no value"},
+        {{"run", "p", "--threads", "0"}, "an integer from 1 to 1024, found '0'"},
+        {{"run", "p", "--threads", "1025"}, "found '1025'"},
+        {{"run", "p", "--threads=two"}, "found 'two'"},
+        {{"run", "p", "--memory-limit", "4X"}, "found '4X'"},
+        {{"run", "p", "--memory-limit=-1"}, "found '-1'"},
+        {{"run", "p", "--crop", "0,0,10"}, "four integers"},
+        {{"run", "p", "--crop", "0,0,10,0"}, "at least 1"},
+        {{"run", "p", "--crop", "0,0,10,10,10"}, "four integers"},
+        {{"run", "p", "--on-missing", "ignore"}, "error|skip|hold"},
+        {{"run", "p", "--set", "graph.sss.taps"}, "PATH=VALUE"},
+        {{"run", "p", "--set", "=3"}, "PATH=VALUE"},
+        {{"plan", "p", "--format", "png"}, "text|dot|svg|json"},
+        {{"init", "c", "--frames", "1"}, "it is for run, check, plan"},
+        {{"run", "p", "--quiet", "--verbose"}, "exclude each other"},
+        {{"passes", "lightning"}, "did you mean 'lighting'?"},
+        {{"run", "p", "--resume"}, "there is no option '--resume'"},
+    };
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        tool_result r = tool_run(rows[i].arguments);
+        if (r.status != 2 || lines(r.err) != 1 || !strstr(r.err, rows[i].says))
+            print_error("row %zu: status %d, %s", i, r.status, r.err);
+        assert_int_equal(r.status, 2);
+        assert_int_equal(lines(r.err), 1);
+        assert_non_null(strstr(r.err, rows[i].says));
+        assert_string_equal(r.out, "");
+        tool_result_free(&r);
+    }
+}
+
+/* A value may begin with a dash, may be glued on with '=', and --set splits at the first '='. */
+static void test_values_of_options(void **state)
+{
+    (void)state;
+    char *pipe, *folder = enter(&pipe);
+    tool_result r = RUN("check", pipe, "--capture", capture, "--frames", "-10--1");
+    expect(&r, 2);
+    assert_non_null(strstr(r.err, "-10")); /* understood, and not listed by the capture */
+    assert_null(strstr(r.err, "option"));
+    tool_result_free(&r);
+    r = RUN("check", pipe, "--capture", capture, "--frames=2-3", "--set", "graph.sss.taps=55",
+            "--set=outputs.beauty.file=\"a=b.{frame}.exr\"");
+    expect(&r, 0);
+    assert_non_null(strstr(r.out, "2 frames (2 to 3)"));
+    tool_result_free(&r);
+    leave(folder, pipe);
+}
+
+/* ---- run -------------------------------------------------------------------------------------------------
+ */
+
+static void test_run(void **state)
+{
+    (void)state;
+    char *pipe, *folder = enter(&pipe), *out = path_in(folder, "deep/er/out");
+    tool_result r = RUN("run", pipe, "--capture", capture, "--frames", "1-3x2", "--out", out);
+    expect(&r, 0);
+    assert_string_equal(r.out, "");
+    assert_int_equal(folder_files(out), 2);
+    char *file = path_in(out, "monkey.0003.exr");
+    assert_non_null(strstr(r.err, file)); /* a plain line a frame, with what was written */
+    assert_int_equal(lines(r.err), 3);    /* and one for the run */
+    tool_result_free(&r);
+    r = RUN("run", pipe, "--capture", capture, "--frames", "1", "--out", out, "--quiet");
+    expect(&r, 0);
+    assert_string_equal(r.err, "");
+    tool_result_free(&r);
+    free(file);
+    free(out);
+    leave(folder, pipe);
+}
+
+static void test_run_json(void **state)
+{
+    (void)state;
+    char *pipe, *folder = enter(&pipe), *out = path_in(folder, "out");
+    tool_result r =
+        RUN("run", pipe, "--capture", capture, "--frames", "1-2", "--out", out, "--json", "--quiet");
+    expect(&r, 0);
+    assert_int_equal(lines(r.out), 2);
+    char *second = strchr(r.out, '\n') + 1;
+    json_t *frame = json_loads(second, JSON_DISABLE_EOF_CHECK, NULL);
+    assert_non_null(frame);
+    assert_int_equal(json_integer_value(json_object_get(frame, "frame")), 2);
+    assert_int_equal(json_integer_value(json_object_get(frame, "total")), 2);
+    assert_string_equal(json_string_value(json_object_get(frame, "capture")), "monkey");
+    assert_true(json_is_true(json_object_get(frame, "ok")));
+    assert_true(json_is_null(json_object_get(frame, "error")));
+    const char *file = json_string_value(json_array_get(json_object_get(frame, "files"), 0));
+    assert_int_equal(access(file, R_OK), 0);
+    json_decref(frame);
+    tool_result_free(&r);
+    free(out);
+    leave(folder, pipe);
+}
+
+/* A frame that fails says so in its object, and the status is 1. */
+static void test_run_json_failure(void **state)
+{
+    (void)state;
+    char *pipe, *folder = enter(&pipe), *out = path_in(folder, "out");
+    tool_result r = RUN("run", pipe, "--capture", capture, "--frames", "1", "--out", out, "--json", "--set",
+                        "materials.default=null");
+    expect(&r, 1);
+    json_t *frame = json_loads(r.out, 0, NULL);
+    assert_non_null(frame);
+    assert_true(json_is_false(json_object_get(frame, "ok")));
+    const char *code = json_string_value(json_object_get(json_object_get(frame, "error"), "code"));
+    assert_string_equal(code, "RL_E_DATA");
+    assert_int_equal(folder_files(out), 0);
+    json_decref(frame);
+    tool_result_free(&r);
+    free(out);
+    leave(folder, pipe);
+}
+
+/* ---- signals ---------------------------------------------------------------------------------------------
+ */
+
+/* Starts the program on 20,000 frames and interrupts it after the first; returns what wait() says and how
+ * many frames were reported. */
+static int interrupt(int number, int times, const char *pipe, const char *out, int *frames)
+{
+    int ends[2], status = 0;
+    char c;
+    assert_int_equal(pipe2(ends, 0), 0);
+    fflush(NULL);
+    pid_t pid = fork();
+    assert_true(pid >= 0);
+    if (!pid) {
+        dup2(ends[1], 1);
+        close(ends[0]);
+        close(ends[1]);
+        execl(program, "relit", "run", pipe, "--out", out, "--json", "--quiet", (char *)NULL);
+        _exit(127);
+    }
+    close(ends[1]);
+    *frames = 0;
+    while (read(ends[0], &c, 1) == 1) {
+        *frames += c == '\n';
+        if (c == '\n' && *frames <= times)
+            kill(pid, number);
+    }
+    close(ends[0]);
+    assert_int_equal(waitpid(pid, &status, 0), pid);
+    return status;
+}
+
+static void test_signals(void **state)
+{
+    (void)state;
+    char *pipe, *folder = enter(&pipe), *out = path_in(folder, "out"),
+                *file = path_in(capture, "monkey.0001.exr");
+    size_t size;
+    char *path = path_in(capture, "capture.yaml"), *manifest = file_read(path, &size);
+    char *same = text_replace(manifest, "monkey.####.exr", file);
+    char *many = text_replace(same, "frames: 1-8", "frames: 1-20000");
+    file_write(folder, "capture.yaml", many, strlen(many));
+    char *with = text_replace(pipeline, "relit: 1\n", "relit: 1\ncapture: capture.yaml\n");
+    file_write(folder, "p.yaml", with, strlen(with));
+    const int numbers[] = {SIGINT, SIGTERM};
+    for (int i = 0; i < 2; i++) {
+        int frames, status = interrupt(numbers[i], 1, pipe, out, &frames);
+        assert_true(WIFSIGNALED(status));
+        assert_int_equal(WTERMSIG(status), numbers[i]);
+        assert_true(frames >= 1 && frames < 20000);
+        assert_true(folder_files(out) >= frames && folder_files(out) < 20000);
+    }
+    free(file);
+    free(path);
+    free(manifest);
+    free(same);
+    free(many);
+    free(with);
+    free(out);
+    leave(folder, pipe);
+}
+
+/* ---- check, plan -----------------------------------------------------------------------------------------
+ */
+
+static void test_check_writes_nothing(void **state)
+{
+    (void)state;
+    char *pipe, *folder = enter(&pipe), *out = path_in(folder, "out");
+    tool_result r = RUN("check", pipe, "--capture", capture, "--out", out);
+    expect(&r, 0);
+    assert_non_null(strstr(r.out, ": OK\n"));
+    assert_non_null(strstr(r.out, "capture 'monkey': 8 frames (1 to 8)"));
+    assert_int_equal(access(out, F_OK), -1);
+    assert_int_equal(folder_files(folder), 1);
+    tool_result_free(&r);
+    r = RUN("check", pipe, "--capture", capture, "--json");
+    expect(&r, 0);
+    json_t *json = json_loads(r.out, 0, NULL);
+    assert_non_null(json);
+    json_decref(json);
+    tool_result_free(&r);
+    r = RUN("check", pipe, "--capture", capture, "--out", pipe);
+    expect(&r, 2); /* a file is in the way */
+    tool_result_free(&r);
+    free(out);
+    leave(folder, pipe);
+}
+
+static void test_plan(void **state)
+{
+    (void)state;
+    char *pipe, *folder = enter(&pipe);
+    tool_result text = RUN("plan", pipe, "--capture", capture);
+    tool_result dot = RUN("plan", pipe, "--capture", capture, "--format", "dot");
+    tool_result json = RUN("plan", pipe, "--capture", capture, "--format", "json");
+    tool_result also = RUN("plan", pipe, "--capture", capture, "--json");
+    expect(&text, 0);
+    expect(&dot, 0);
+    expect(&json, 0);
+    assert_non_null(strstr(text.out, "sss.color"));
+    assert_non_null(strstr(text.out, "spare")); /* culled, and said */
+    assert_int_equal(strncmp(dot.out, "digraph", 7), 0);
+    json_t *value = json_loads(json.out, 0, NULL);
+    assert_non_null(value);
+    assert_string_equal(json.out, also.out);
+    json_decref(value);
+    tool_result_free(&text);
+    tool_result_free(&dot);
+    tool_result_free(&json);
+    tool_result_free(&also);
+    leave(folder, pipe);
+}
+
+/* In a child: graphviz's plugins keep memory, which is not ours to report. */
+static void test_plan_svg(void **state)
+{
+    (void)state;
+    char *pipe, *folder = enter(&pipe);
+    const char *arguments[] = {"plan", pipe, "--capture", capture, "--format", "svg", NULL};
+    tool_result r = tool_run_child("ASAN_OPTIONS=detect_leaks=0", arguments);
+    expect(&r, 0);
+    assert_non_null(strstr(r.out, "<svg "));
+    assert_non_null(strstr(r.out, "sss"));
+    assert_non_null(strstr(r.out, "</svg>"));
+    assert_string_equal(r.err, "");
+    tool_result_free(&r);
+    leave(folder, pipe);
+}
+
+/* ---- init, inspect ---------------------------------------------------------------------------------------
+ */
+
+static void expect_init_checks(const char *of, const char *has)
+{
+    char *folder = folder_new(), *pipe = path_in(folder, "init.yaml");
+    tool_result r = RUN("init", of);
+    expect(&r, 0);
+    assert_non_null(strstr(r.out, has));
+    file_write(folder, "init.yaml", r.out, strlen(r.out));
+    tool_result_free(&r);
+    r = RUN("check", pipe);
+    expect(&r, 0);
+    assert_string_equal(r.err, "");
+    tool_result_free(&r);
+    free(pipe);
+    folder_remove(folder);
+}
+
+static void test_init(void **state)
+{
+    (void)state;
+    char *file = path_in(capture, "monkey.0001.exr"), *manifest = path_in(capture, "capture.yaml");
+    expect_init_checks(capture,
+                       "#  key: {type: point, position: [-0.5, -0.52, 0.47], intensity: [2.2, 2.024, 1.804]");
+    expect_init_checks(manifest, "#  skin: {scatter_distance_mm: [3.0, 1.2, 0.7]}");
+    expect_init_checks(file, "id-6: {stencil: 6}"); /* no manifest: ids from the pixels */
+    free(file);
+    free(manifest);
+}
+
+/* What is commented must be right too: with every comment of a whole line taken out it still checks. */
+static void test_init_uncommented(void **state)
+{
+    (void)state;
+    char *folder = folder_new(), *pipe = path_in(folder, "init.yaml");
+    tool_result r = RUN("init", capture);
+    expect(&r, 0);
+    char *to = r.out;
+    for (const char *from = r.out; *from; from++) {
+        bool start = from == r.out || from[-1] == '\n';
+        if (!(start && *from == '#' && (from[1] != ' ' || from[2] == ' ')))
+            *to++ = *from;
+    }
+    *to = 0;
+    file_write(folder, "init.yaml", r.out, strlen(r.out));
+    assert_non_null(strstr(r.out, "\nlights:\n"));
+    tool_result_free(&r);
+    r = RUN("check", pipe);
+    expect(&r, 0);
+    tool_result_free(&r);
+    free(pipe);
+    folder_remove(folder);
+}
+
+static void test_inspect(void **state)
+{
+    (void)state;
+    char *folder = folder_new(), *file = path_in(capture, "monkey.0001.exr"),
+         *copy = path_in(folder, "c.yaml");
+    tool_result r = RUN("inspect", file);
+    expect(&r, 0);
+    assert_non_null(strstr(r.out, "scanline, zip compression"));
+    assert_non_null(strstr(r.out, "data window    480 x 270 at 0, 0"));
+    assert_non_null(strstr(r.out, "stencil.ID             uint"));
+    assert_non_null(strstr(r.out, "camera:jitter (v2f): [0 -0.1666"));
+    char *manifest = strstr(r.out, "relit_capture: 1\n");
+    assert_non_null(manifest);
+    file_write(folder, "c.yaml", manifest, strlen(manifest));
+    tool_result_free(&r);
+    r = RUN("init", copy); /* the printed manifest is one */
+    expect(&r, 0);
+    tool_result_free(&r);
+    r = RUN("inspect", capture);
+    expect(&r, 0);
+    assert_non_null(strstr(r.out, "stencil_names: {1: skin"));
+    tool_result_free(&r);
+    r = RUN("inspect", folder); /* neither a capture nor an EXR */
+    expect(&r, 2);
+    tool_result_free(&r);
+    free(file);
+    free(copy);
+    folder_remove(folder);
+}
+
+/* A folder without manifest: its sequences, each by its first file. */
+static void test_inspect_folder(void **state)
+{
+    (void)state;
+    char *folder = folder_new();
+    const char *names[] = {"monkey.0001.exr", "monkey.0002.exr", "monkey.0003.exr"};
+    for (int i = 0; i < 3; i++) {
+        size_t size;
+        char *path = path_in(capture, names[i]), *data = file_read(path, &size);
+        file_write(folder, names[i], data, size);
+        free(path);
+        free(data);
+    }
+    tool_result r = RUN("inspect", folder);
+    expect(&r, 0);
+    char *pattern = path_in(folder, "monkey.####.exr\n"), *second = path_in(folder, names[1]);
+    assert_non_null(strstr(r.out, pattern));
+    assert_null(strstr(r.out, second));
+    assert_non_null(strstr(r.out, "frames: 1-3"));
+    tool_result_free(&r);
+    free(pattern);
+    free(second);
+    folder_remove(folder);
+}
+
+/* ---- passes, devices -------------------------------------------------------------------------------------
+ */
+
+static void expect_rows(const char *text, rl_params rows)
+{
+    for (size_t i = 0; i < rows.n; i++) {
+        assert_non_null(strstr(text, rows.rows[i].name));
+        assert_non_null(strstr(text, rows.rows[i].help));
+    }
+}
+
+static void test_passes(void **state)
+{
+    (void)state;
+    tool_result all = RUN("passes"), json = RUN("passes", "--json");
+    expect(&all, 0);
+    expect(&json, 0);
+    json_t *list = json_loads(json.out, 0, NULL);
+    assert_true(json_is_array(list));
+    assert_int_equal(json_array_size(list), rl_pass_count());
+    for (size_t i = 0; i < rl_pass_count(); i++) {
+        const rl_pass *pass = rl_pass_at(i);
+        tool_result r = RUN("passes", pass->name);
+        expect(&r, 0);
+        assert_non_null(strstr(all.out, pass->name));
+        for (size_t k = 0; k < pass->ports.n; k++)
+            assert_true(pass->ports.rows[k].role == RL_SCRATCH || strstr(r.out, pass->ports.rows[k].help));
+        expect_rows(r.out, pass->params);
+        expect_rows(r.out, pass->profile_keys);
+        expect_rows(r.out, pass->material_keys);
+        expect_rows(r.out, pass->shading_keys);
+        json_t *object = json_array_get(list, i);
+        assert_int_equal(json_array_size(json_object_get(object, "parameters")), pass->params.n);
+        tool_result_free(&r);
+    }
+    json_decref(list);
+    tool_result_free(&all);
+    tool_result_free(&json);
+}
+
+static void test_devices(void **state)
+{
+    (void)state;
+    tool_result r = RUN("devices");
+    expect(&r, 0);
+    assert_int_equal(r.out[0] == '*' || strstr(r.out, "\n* "), 1);
+    tool_result_free(&r);
+    r = RUN("devices", "--json");
+    expect(&r, 0);
+    json_t *list = json_loads(r.out, 0, NULL);
+    assert_true(json_array_size(list) >= 1);
+    json_decref(list);
+    tool_result_free(&r);
+    r = RUN("devices", "--device", "99");
+    expect(&r, 2);
+    tool_result_free(&r);
+    const char *arguments[] = {"devices", NULL};
+    r = tool_run_child("OCL_ICD_VENDORS=/nonexistent", arguments);
+    expect(&r, 2);
+    assert_non_null(strstr(r.err, "no OpenCL device"));
+    tool_result_free(&r);
+}
+
+/* ---- the program -----------------------------------------------------------------------------------------
+ */
+
+static void test_program(void **state)
+{
+    (void)state;
+    const char *version[] = {"--version", NULL}, *wrong[] = {"rum", NULL};
+    tool_result r = tool_spawn(program, NULL, version);
+    expect(&r, 0);
+    assert_string_equal(r.out, "relit " RL_VERSION "\n");
+    tool_result_free(&r);
+    r = tool_spawn(program, NULL, wrong);
+    expect(&r, 2);
+    assert_string_equal(r.out, "");
+    tool_result_free(&r);
+}
+
+static void find_program(void)
+{
+    ssize_t n = readlink("/proc/self/exe", program, sizeof program - 16);
+    program[n > 0 ? n : 0] = 0;
+    for (int i = 0; i < 2 && strrchr(program, '/'); i++) /* BUILD/tests/test_tool -> BUILD */
+        *strrchr(program, '/') = 0;
+    strcat(program, "/relit");
+}
+
+int main(int argc, char **argv)
+{
+    tool_child(argc, argv);
+    find_program();
+    if (!realpath("captures/monkey", capture)) {
+        fprintf(stderr, "run this from the repository: captures/monkey is not here\n");
+        return 1;
+    }
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_help),
+        cmocka_unit_test(test_version),
+        cmocka_unit_test(test_usage),
+        cmocka_unit_test(test_values_of_options),
+        cmocka_unit_test(test_run),
+        cmocka_unit_test(test_run_json),
+        cmocka_unit_test(test_run_json_failure),
+        cmocka_unit_test(test_signals),
+        cmocka_unit_test(test_check_writes_nothing),
+        cmocka_unit_test(test_plan),
+        cmocka_unit_test(test_plan_svg),
+        cmocka_unit_test(test_init),
+        cmocka_unit_test(test_init_uncommented),
+        cmocka_unit_test(test_inspect),
+        cmocka_unit_test(test_inspect_folder),
+        cmocka_unit_test(test_passes),
+        cmocka_unit_test(test_devices),
+        cmocka_unit_test(test_program),
+    };
+    return cmocka_run_group_tests_name("tool", tests, NULL, NULL);
+}

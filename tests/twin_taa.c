@@ -1,0 +1,189 @@
+#include <math.h>
+#include <string.h>
+
+#include "tests/twin_shading.h"
+#include "tests/twin_taa.h"
+
+static const double far_depth = 1e18;
+
+static int clamp_to(int x, int low, int high)
+{
+    return x < low ? low : x > high ? high : x;
+}
+
+/* The nearest pixel inside. */
+static double tap(const shade_run *run, int port, int plane, int x, int y)
+{
+    const frame_t *f = &run->frame;
+    return *shade_at(run->images[port], f, plane, clamp_to(x, f->valid[0], f->valid[2] - 1),
+                     clamp_to(y, f->valid[1], f->valid[3] - 1));
+}
+
+static uint32_t tap_id(const shade_run *run, int port, int x, int y)
+{
+    const frame_t *f = &run->frame;
+    return shade_id(run->images[port], f, clamp_to(x, f->valid[0], f->valid[2] - 1),
+                    clamp_to(y, f->valid[1], f->valid[3] - 1));
+}
+
+static double depth_at(const shade_run *run, int port, int x, int y)
+{
+    double z = tap(run, port, 0, x, y);
+    return z > 0 ? z : far_depth;
+}
+
+static void to_ycocg(const double *rgb, double *v)
+{
+    v[0] = rgb[0] / 4 + rgb[1] / 2 + rgb[2] / 4;
+    v[1] = rgb[0] / 2 - rgb[2] / 2;
+    v[2] = -rgb[0] / 4 + rgb[1] / 2 - rgb[2] / 4;
+}
+
+/* Clips `past` to mean +- gamma deviations of the 3x3 neighbourhood, grown to contain the pixel's own colour;
+ * returns the largest luminance of the neighbours. */
+static double clip(const shade_run *run, int x, int y, bool still, double *past)
+{
+    double v[9][3], brightest = 0, low[3], high[3], p[3], out = 1;
+    double gamma = ((const twin_taa_params *)run->params)->clip_gamma * (still ? 2 : 1);
+    for (int i = 0; i < 9; i++) {
+        double rgb[3];
+        for (int c = 0; c < 3; c++)
+            rgb[c] = tap(run, TAA_COLOR, c, x + i % 3 - 1, y + i / 3 - 1);
+        to_ycocg(rgb, v[i]);
+        brightest = i == 4 ? brightest : fmax(brightest, v[i][0]);
+    }
+    to_ycocg(past, p);
+    for (int c = 0; c < 3; c++) {
+        double mean = 0, variance = 0, own_value;
+        for (int i = 0; i < 9; i++)
+            mean += v[i][c] / 9;
+        for (int i = 0; i < 9; i++)
+            variance += (v[i][c] - mean) * (v[i][c] - mean) / 9;
+        own_value = v[4][c];
+        low[c] = fmin(mean - gamma * sqrt(variance), own_value);
+        high[c] = fmax(mean + gamma * sqrt(variance), own_value);
+        out = fmax(out, fabs(p[c] - (low[c] + high[c]) / 2) / fmax((high[c] - low[c]) / 2, 1e-6));
+    }
+    for (int c = 0; c < 3; c++)
+        p[c] = (low[c] + high[c]) / 2 + (p[c] - (low[c] + high[c]) / 2) / out;
+    past[0] = p[0] - p[2] + p[1];
+    past[1] = p[0] + p[2];
+    past[2] = p[0] - p[2] - p[1];
+    return brightest;
+}
+
+static double weight(const double *rgb, double brightest)
+{
+    double v[3];
+    to_ycocg(rgb, v);
+    return 1 / (1 + fmax(v[0] - 2 * brightest, 0));
+}
+
+/* Displacement and previous depth by the cameras, for the sample of pixel (x, y) at depth z. */
+static void follow(const frame_t *f, int x, int y, double z, double *d, double *then)
+{
+    const camera_t *a = &f->camera, *b = &f->previous;
+    double view[3], world[3], p[3];
+    bool same = memcmp(a->to_view, b->to_view, sizeof a->to_view) == 0 &&
+                memcmp(a->focal, b->focal, sizeof a->focal) == 0 &&
+                memcmp(a->centre, b->centre, sizeof a->centre) == 0;
+    twin_ray(f, a, x, y, view, world);
+    for (int i = 0; i < 3; i++)
+        world[i] = world[i] * z + a->to_world[4 * i + 3];
+    for (int i = 0; i < 3; i++)
+        p[i] = b->to_view[4 * i] * world[0] + b->to_view[4 * i + 1] * world[1] +
+               b->to_view[4 * i + 2] * world[2] + b->to_view[4 * i + 3];
+    *then = same || z >= far_depth ? z : -p[2];
+    d[0] = b->centre[0] + b->focal[0] * p[0] / -p[2] - (x + f->origin[0] + 0.5 + a->jitter[0]);
+    d[1] = b->centre[1] - b->focal[1] * p[1] / -p[2] - (y + f->origin[1] + 0.5 + a->jitter[1]);
+    if (same || -p[2] <= 0)
+        d[0] = d[1] = same ? 0 : 1e9;
+}
+
+static void displacement(const shade_run *run, int x, int y, double *d, double *then)
+{
+    double own = depth_at(run, TAA_DEPTH, x, y), best = own, ignored;
+    int at = 4;
+    for (int i = 0; i < 9; i++) {
+        double z = depth_at(run, TAA_DEPTH, x + i % 3 - 1, y + i / 3 - 1);
+        at = z < best ? i : at;
+        best = fmin(best, z);
+    }
+    int nx = x + at % 3 - 1, ny = y + at / 3 - 1;
+    follow(&run->frame, x, y, own, d, then);
+    if (run->images[TAA_MOTION]) {
+        d[0] = tap(run, TAA_MOTION, 0, nx, ny);
+        d[1] = tap(run, TAA_MOTION, 1, nx, ny);
+    } else {
+        follow(&run->frame, nx, ny, best, d, &ignored);
+    }
+    for (int i = 0; i < 2; i++)
+        if (fabs(d[i] - floor(d[i] + 0.5)) < 1.0 / 1024)
+            d[i] = floor(d[i] + 0.5);
+}
+
+/* Whether the 3x3 history pixels around (x, y) show the pixel's material at depths around z. */
+static bool shows(const shade_run *run, int x, int y, uint32_t id, double z)
+{
+    double low = 2 * far_depth, high = 0;
+    for (int i = 0; i < 9; i++) {
+        int nx = x + i % 3 - 1, ny = y + i / 3 - 1;
+        if (run->images[TAA_STENCIL] && tap_id(run, TAA_LAST_STENCIL, nx, ny) != id)
+            continue;
+        low = fmin(low, depth_at(run, TAA_LAST_DEPTH, nx, ny));
+        high = fmax(high, depth_at(run, TAA_LAST_DEPTH, nx, ny));
+    }
+    return z >= low * 0.98 && z <= high * 1.02;
+}
+
+/* Catmull-Rom spline through samples at -1, 0, 1, 2. */
+static double kernel_weight(double t)
+{
+    t = fabs(t);
+    return t < 1 ? 1 + t * t * (1.5 * t - 2.5) : t < 2 ? 2 + t * (-4 + t * (2.5 - 0.5 * t)) : 0;
+}
+
+static double resample(const shade_run *run, int plane, double x, double y)
+{
+    int ix = (int)floor(x), iy = (int)floor(y);
+    double sum = 0, least = 0;
+    if (x == ix && y == iy)
+        return tap(run, TAA_LAST_COLOR, plane, ix, iy);
+    for (int j = iy - 1; j <= iy + 2; j++) {
+        for (int i = ix - 1; i <= ix + 2; i++) {
+            double v = tap(run, TAA_LAST_COLOR, plane, i, j);
+            sum += v * kernel_weight(x - i) * kernel_weight(y - j);
+            least = fmin(least, v);
+        }
+    }
+    return fmax(sum, least);
+}
+
+void twin_taa(const shade_run *run, int x, int y, double *out)
+{
+    const frame_t *f = &run->frame;
+    const twin_taa_params *p = run->params;
+    double own[3], past[3], d[2], then;
+    for (int c = 0; c < 3; c++)
+        out[c] = own[c] = *shade_at(run->images[TAA_COLOR], f, c, x, y);
+    out[3] = 1;
+    if (!f->history || x < f->valid[0] || y < f->valid[1] || x >= f->valid[2] || y >= f->valid[3])
+        return;
+    displacement(run, x, y, d, &then);
+    double px = x + d[0], py = y + d[1];
+    if (px < f->valid[0] - 0.5 || py < f->valid[1] - 0.5 || px >= f->valid[2] - 0.5 ||
+        py >= f->valid[3] - 0.5)
+        return;
+    int nx = (int)ceil(px - 0.5), ny = (int)ceil(py - 0.5); /* nearest, halves down */
+    uint32_t id = run->images[TAA_STENCIL] ? shade_id(run->images[TAA_STENCIL], f, x, y) : 0;
+    if (!shows(run, nx, ny, id, then))
+        return;
+    for (int c = 0; c < 3; c++)
+        past[c] = resample(run, c, px, py);
+    double n = tap(run, TAA_LAST_COUNT, 0, nx, ny), alpha = fmax(1 / (1 + n), p->blend);
+    double brightest = clip(run, x, y, d[0] == 0 && d[1] == 0, past);
+    double w = alpha * weight(own, brightest), w_past = (1 - alpha) * weight(past, brightest);
+    for (int c = 0; c < 3; c++)
+        out[c] = (own[c] * w + past[c] * w_past) / (w + w_past);
+    out[3] = fmin(n + 1, 65536);
+}
