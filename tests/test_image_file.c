@@ -155,7 +155,7 @@ static void test_metadata(void **state)
 {
     static const rl_image_note notes[] = {{"Software", "relit 1"}, {"ImageDescription", "skin.yaml 0123"}};
     rl_image_planes p = planes(3);
-    rl_image_options o = {.type = RL_IMAGE_U8, .colorspace = "sRGB", .notes = notes, .notes_n = 2};
+    rl_image_options o = {.type = RL_IMAGE_U8, .colorspace = "sRGB / ACES", .notes = notes, .notes_n = 2};
     static const char *const names[] = {"meta.png", "meta.tif", "meta.jpg"};
     char text[64];
     rl_image_file file;
@@ -174,6 +174,23 @@ static void test_metadata(void **state)
         assert_int_equal(rl_image_file_read(in_folder(names[i]), &file, NULL), RL_OK);
         assert_string_equal(file.colorspace, "sRGB");
         rl_image_file_free(&file);
+    }
+}
+
+static void test_png_text(void **state)
+{
+    static const rl_image_note notes[] = {{"relit:pipeline", "skin 0123"}};
+    rl_image_planes p = planes(3);
+    rl_image_options o = {.type = RL_IMAGE_U8, .colorspace = "Rec.709 / ACES", .notes = notes, .notes_n = 1};
+    static const char *const names[] = {"relit:pipeline", "relit:colorspace", "jpeg:subsampling", "DateTime"};
+    static const char *const want[] = {"skin 0123", "Rec.709 / ACES", "", ""};
+    char text[64];
+    (void)state;
+    assert_int_equal(rl_image_file_write(in_folder("text2.png"), &p, &o, NULL, NULL, NULL), RL_OK);
+    for (size_t i = 0; i < 4; i++) {
+        assert_int_equal(rl_image_file_note(in_folder("text2.png"), names[i], text, sizeof text, NULL),
+                         RL_OK);
+        assert_string_equal(text, want[i]);
     }
 }
 
@@ -288,6 +305,7 @@ int main(void)
         cmocka_unit_test(test_rounds_to_nearest),
         cmocka_unit_test(test_same_bytes_with_threads),
         cmocka_unit_test(test_metadata),
+        cmocka_unit_test(test_png_text),
         cmocka_unit_test(test_windows),
         cmocka_unit_test(test_unknown_extension),
         cmocka_unit_test(test_unwritable),
