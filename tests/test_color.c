@@ -12,6 +12,7 @@
 
 #include "graph/base/alloc.h"
 #include "graph/base/file.h"
+#include "graph/base/pool.h"
 #include "graph/base/text.h"
 #include "graph/run/color.h"
 #include "graph/run/color_emit.h"
@@ -277,6 +278,39 @@ static void test_same_bits(void **state)
     assert_memory_equal(a, b, 3 * N * sizeof *a);
     rl_free(in);
     rl_arena_free(&arena);
+}
+
+/* Rows of one image, converted on several threads with one transform. */
+typedef struct conversion {
+    const rl_ocio_transform *transform;
+    float *planes;
+} conversion;
+
+static void convert_row(void *ctx, int y)
+{
+    const conversion *c = ctx;
+    float *row = c->planes + y * COLUMNS;
+    if (rl_ocio_apply(c->transform, row, row + N, row + 2 * N, COLUMNS, NULL) != RL_OK)
+        row[0] = -1000;
+}
+
+static void test_rows_on_threads(void **state)
+{
+    static const rl_ocio_request request = {.from = "srgb_texture", .to = "ACEScg"};
+    float *a = rl_malloc(6 * N * sizeof *a), *b = a + 3 * N;
+    rl_ocio_transform *transform = NULL;
+    rl_pool *pool = NULL;
+    (void)state;
+    fill_colours(a, 0, 1);
+    memcpy(b, a, 3 * N * sizeof *a);
+    assert_int_equal(rl_ocio_transform_new(config, &request, &transform, NULL), RL_OK);
+    assert_int_equal(rl_ocio_apply(transform, a, a + N, a + 2 * N, N, NULL), RL_OK);
+    assert_int_equal(rl_pool_new(4, &pool, NULL), RL_OK);
+    rl_pool_for(pool, ROWS, convert_row, &(conversion){transform, b});
+    assert_memory_equal(a, b, 3 * N * sizeof *a);
+    rl_pool_free(&pool);
+    rl_ocio_transform_free(&transform);
+    rl_free(a);
 }
 
 /* ---- every generator --------------------------------------------------------------------------------- */
@@ -638,19 +672,13 @@ static void test_unnamed_primaries(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_views_match),
-        cmocka_unit_test(test_spaces_match),
-        cmocka_unit_test(test_config_is_whole),
-        cmocka_unit_test(test_out_of_memory),
-        cmocka_unit_test(test_no_change_no_pass),
-        cmocka_unit_test(test_exposure),
-        cmocka_unit_test(test_same_bits),
-        cmocka_unit_test(test_every_operation),
-        cmocka_unit_test(test_bakes_and_says_so),
-        cmocka_unit_test(test_functions),
-        cmocka_unit_test(test_names),
-        cmocka_unit_test(test_unknown_names),
-        cmocka_unit_test(test_primaries),
+        cmocka_unit_test(test_views_match),       cmocka_unit_test(test_spaces_match),
+        cmocka_unit_test(test_config_is_whole),   cmocka_unit_test(test_out_of_memory),
+        cmocka_unit_test(test_no_change_no_pass), cmocka_unit_test(test_exposure),
+        cmocka_unit_test(test_same_bits),         cmocka_unit_test(test_rows_on_threads),
+        cmocka_unit_test(test_every_operation),   cmocka_unit_test(test_bakes_and_says_so),
+        cmocka_unit_test(test_functions),         cmocka_unit_test(test_names),
+        cmocka_unit_test(test_unknown_names),     cmocka_unit_test(test_primaries),
         cmocka_unit_test(test_unnamed_primaries),
     };
     return cmocka_run_group_tests_name("color", tests, setup, teardown);

@@ -76,16 +76,16 @@ static void test_round_trips(void **state)
         int channels;
         double bound;
     } cases[] = {
-        {"a.png",  RL_IMAGE_U8,    3, 0.5 / 255 + 1e-6  },
-        {"b.png",  RL_IMAGE_U16,   3, 0.5 / 65535 + 1e-6},
-        {"c.png",  RL_IMAGE_U8,    1, 0.5 / 255 + 1e-6  },
-        {"d.tif",  RL_IMAGE_U8,    3, 0.5 / 255 + 1e-6  },
-        {"e.tif",  RL_IMAGE_U16,   4, 0.5 / 65535 + 1e-6},
-        {"f.tiff", RL_IMAGE_HALF,  3, 5e-4              },
-        {"g.tif",  RL_IMAGE_FLOAT, 3, 0                 },
-        {"h.bmp",  RL_IMAGE_U8,    3, 0.5 / 255 + 1e-6  },
-        {"i.jpg",  RL_IMAGE_U8,    3, 0.5               },
-        {"j.PNG",  RL_IMAGE_U8,    3, 0.5 / 255 + 1e-6  },
+        {"a.png", RL_IMAGE_U8, 3, 0.5 / 255 + 1e-6},
+        {"b.png", RL_IMAGE_U16, 3, 0.5 / 65535 + 1e-6},
+        {"c.png", RL_IMAGE_U8, 1, 0.5 / 255 + 1e-6},
+        {"d.tif", RL_IMAGE_U8, 3, 0.5 / 255 + 1e-6},
+        {"e.tif", RL_IMAGE_U16, 4, 0.5 / 65535 + 1e-6},
+        {"f.tiff", RL_IMAGE_HALF, 3, 5e-4},
+        {"g.tif", RL_IMAGE_FLOAT, 3, 0},
+        {"h.bmp", RL_IMAGE_U8, 3, 0.5 / 255 + 1e-6},
+        {"i.jpg", RL_IMAGE_U8, 3, 0.5},
+        {"j.PNG", RL_IMAGE_U8, 3, 0.5 / 255 + 1e-6},
     };
     (void)state;
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
@@ -153,12 +153,9 @@ static void test_same_bytes_with_threads(void **state)
 
 static void test_metadata(void **state)
 {
-    static const rl_image_note notes[] = {
-        {"Software",         "relit 1"       },
-        {"ImageDescription", "skin.yaml 0123"}
-    };
+    static const rl_image_note notes[] = {{"Software", "relit 1"}, {"ImageDescription", "skin.yaml 0123"}};
     rl_image_planes p = planes(3);
-    rl_image_options o = {.type = RL_IMAGE_U8, .colorspace = "sRGB", .notes = notes, .notes_n = 2};
+    rl_image_options o = {.type = RL_IMAGE_U8, .colorspace = "sRGB / ACES", .notes = notes, .notes_n = 2};
     static const char *const names[] = {"meta.png", "meta.tif", "meta.jpg"};
     char text[64];
     rl_image_file file;
@@ -180,12 +177,27 @@ static void test_metadata(void **state)
     }
 }
 
+static void test_png_text(void **state)
+{
+    static const rl_image_note notes[] = {{"relit:pipeline", "skin 0123"}};
+    rl_image_planes p = planes(3);
+    rl_image_options o = {.type = RL_IMAGE_U8, .colorspace = "Rec.709 / ACES", .notes = notes, .notes_n = 1};
+    static const char *const names[] = {"relit:pipeline", "relit:colorspace", "jpeg:subsampling", "DateTime"};
+    static const char *const want[] = {"skin 0123", "Rec.709 / ACES", "", ""};
+    char text[64];
+    (void)state;
+    assert_int_equal(rl_image_file_write(in_folder("text2.png"), &p, &o, NULL, NULL, NULL), RL_OK);
+    for (size_t i = 0; i < 4; i++) {
+        assert_int_equal(rl_image_file_note(in_folder("text2.png"), names[i], text, sizeof text, NULL),
+                         RL_OK);
+        assert_string_equal(text, want[i]);
+    }
+}
+
 static void test_windows(void **state)
 {
     rl_image_planes p = planes(3);
-    rl_image_options o = {
-        .type = RL_IMAGE_U16, .x = 5, .y = 3, .display = {0, 0, 64, 48}
-    };
+    rl_image_options o = {.type = RL_IMAGE_U16, .x = 5, .y = 3, .display = {0, 0, 64, 48}};
     rl_image_file file;
     (void)state;
     assert_int_equal(rl_image_file_write(in_folder("window.tif"), &p, &o, NULL, NULL, NULL), RL_OK);
@@ -293,6 +305,7 @@ int main(void)
         cmocka_unit_test(test_rounds_to_nearest),
         cmocka_unit_test(test_same_bytes_with_threads),
         cmocka_unit_test(test_metadata),
+        cmocka_unit_test(test_png_text),
         cmocka_unit_test(test_windows),
         cmocka_unit_test(test_unknown_extension),
         cmocka_unit_test(test_unwritable),

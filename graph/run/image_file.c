@@ -139,20 +139,40 @@ static rl_code pack(const rl_image_planes *image, rl_image_type type, rl_pool *p
 
 #define OWN_ATTRIBUTES 7
 
+/* What a format's own tag can say: "sRGB" for the display of that name, whatever the view. */
+static const char *tag_of(const char *colorspace)
+{
+    size_t n = strcspn(colorspace, " ");
+    bool srgb = strncasecmp(colorspace, "sRGB", n) == 0 && n == 4 &&
+                (colorspace[n] == 0 || strncmp(colorspace + n, " / ", 3) == 0);
+    return srgb ? "sRGB" : colorspace;
+}
+
+/* Formats keep text that they do not know as text, so each gets only what is meant for it. */
 static size_t fill_attributes(const char *path, const rl_image_options *o, rl_oiio_attribute *out)
 {
+    const char *extension = rl_path_extension(path);
+    int level = o->compression ? o->compression : 1;
     size_t n = 0;
-    /* OpenImageIO puts the time of writing into TIFF files; the same image must be the same file. Exif's form
-     * of "not known". */
-    if (in_list(".tif,.tiff", rl_path_extension(path)))
+    if (in_list(".tif,.tiff", extension)) {
+        /* OpenImageIO puts the time of writing into TIFF files; the same image must be the same file. Exif's
+         * form of "not known". */
         out[n++] = (rl_oiio_attribute){"DateTime", "    :  :     :  :  ", 0};
-    out[n++] = (rl_oiio_attribute){"CompressionQuality", NULL, o->quality ? o->quality : 95};
-    out[n++] = (rl_oiio_attribute){"png:compressionLevel", NULL, o->compression ? o->compression : 1};
-    out[n++] = (rl_oiio_attribute){"tiff:zipquality", NULL, o->compression ? o->compression : 1};
-    out[n++] = (rl_oiio_attribute){"jpeg:subsampling", "4:4:4", 0};
-    out[n++] = (rl_oiio_attribute){"tiff:half", NULL, o->type == RL_IMAGE_HALF}; /* or it becomes float */
-    if (o->colorspace)
-        out[n++] = (rl_oiio_attribute){"oiio:ColorSpace", o->colorspace, 0};
+        out[n++] = (rl_oiio_attribute){"tiff:zipquality", NULL, level};
+        out[n++] = (rl_oiio_attribute){"tiff:half", NULL, o->type == RL_IMAGE_HALF}; /* or it becomes float */
+    } else if (in_list(".png", extension)) {
+        /* One filter for all rows (libpng's "sub") takes 40 % less time than trying them all, for 5 % larger
+         * files. */
+        out[n++] = (rl_oiio_attribute){"png:compressionLevel", NULL, level};
+        out[n++] = (rl_oiio_attribute){"png:filter", NULL, 0x10};
+    } else {
+        out[n++] = (rl_oiio_attribute){"CompressionQuality", NULL, o->quality ? o->quality : 95};
+        out[n++] = (rl_oiio_attribute){"jpeg:subsampling", "4:4:4", 0};
+    }
+    if (o->colorspace) {
+        out[n++] = (rl_oiio_attribute){"oiio:ColorSpace", tag_of(o->colorspace), 0};
+        out[n++] = (rl_oiio_attribute){"relit:colorspace", o->colorspace, 0};
+    }
     for (size_t i = 0; i < o->notes_n; i++)
         out[n++] = (rl_oiio_attribute){o->notes[i].name, o->notes[i].text, 0};
     return n;

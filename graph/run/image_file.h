@@ -46,8 +46,9 @@ typedef struct rl_image_options {
     rl_image_type type;
     int x, y;       /* of the first pixel in the display window */
     int display[4]; /* x, y, width, height; all 0: the image itself */
-    const char
-        *colorspace; /* "sRGB" tags the file so; others are kept as text where the format can; NULL: no tag */
+    /* "sRGB" or "sRGB / view" tags the file so; all are kept as text "relit:colorspace" where the format can;
+     * NULL: no tag. */
+    const char *colorspace;
     int quality;     /* JPEG, WebP: 1…100; 0: 95 */
     int compression; /* PNG, TIFF: deflate level 1…9; 0: 1, since 6 takes several times as long */
     const rl_image_note *notes;
