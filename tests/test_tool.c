@@ -580,6 +580,36 @@ static void test_passes(void **state)
     tool_result_free(&json);
 }
 
+/* The example that `relit passes kernel` prints compiles and runs, and its range holds. */
+static void test_kernel_example(void **state)
+{
+    (void)state;
+    char *pipe, *folder = enter(&pipe), *out = path_in(folder, "out");
+    tool_result r = RUN("passes", "kernel");
+    expect(&r, 0);
+    expect_narrow(r.out);
+    char *node = strstr(r.out, "in the pipeline:\n"), *source = strstr(r.out, "in dim.cl:\n");
+    assert_true(node && source);
+    node += strlen("in the pipeline:\n");
+    file_write(folder, "dim.cl", source + strlen("in dim.cl:\n"), strlen(source + strlen("in dim.cl:\n")));
+    source[-(ptrdiff_t)strlen("example, ")] = 0;
+    char *added = text_replace(pipeline, "outputs:", node),
+         *whole = text_replace(added, "  beauty:", "outputs:\n  beauty:");
+    file_write(folder, "p.yaml", whole, strlen(whole));
+    tool_result got = RUN("run", pipe, "--capture", capture, "--frames", "1", "--out", out, "--set",
+                          "outputs.beauty.image=dim.out");
+    expect(&got, 0);
+    tool_result_free(&got);
+    got = RUN("check", pipe, "--capture", capture, "--set", "graph.dim.amount=2");
+    expect(&got, 2); /* its range holds */
+    tool_result_free(&got);
+    tool_result_free(&r);
+    free(added);
+    free(whole);
+    free(out);
+    leave(folder, pipe);
+}
+
 static void test_devices(void **state)
 {
     (void)state;
@@ -655,6 +685,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(test_inspect),
         cmocka_unit_test(test_inspect_folder),
         cmocka_unit_test(test_passes),
+        cmocka_unit_test(test_kernel_example),
         cmocka_unit_test(test_devices),
         cmocka_unit_test(test_program),
     };
