@@ -4,6 +4,8 @@
 
 #define WEIGHTING_AREA  0
 #define WEIGHTING_PLAIN 1
+#define ORIENTATION_SCREEN  0
+#define ORIENTATION_TANGENT 1
 
 enum { TEXTURING_POST = 0, TEXTURING_PRE_POST = 1 };
 enum { BORDER_RENORMALIZE = 0, BORDER_OCCLUDE = 1 };
@@ -11,6 +13,13 @@ enum { DIFFUSE_DISNEY = 0, DIFFUSE_LAMBERT = 1 };
 enum { EXIT_SSS = 0, EXIT_LIGHTING = 1 };
 
 #define BURLEY_RADIUS 16.5644f /* in units of d: where P = 0.997 */
+
+/* What the filters read: planes in RL_PHASE4. */
+typedef struct inputs_t {
+    global const float *diffuse, *depth, *area;
+    global const uint *stencil;
+    constant frame_t *f;
+} inputs_t;
 
 /* ---- one vector of a sub-image ----------------------------------------------------------------------------- */
 
@@ -124,6 +133,14 @@ static inline floatv scatter_slope(global const float *depth, global const uint 
     intv has_a = rl_as_intv(rl_vload(0, stencil + i)) == id, has_b = rl_as_intv(rl_vload(0, stencil + j)) == id;
     intv take_a = has_a & (~has_b | (fabs(a) <= fabs(b)));
     return rl_select(scatter_keep(b, has_b), a, take_a);
+}
+
+/* The same in metres of depth a metre of the screen's plane, at most MOST_TILT (84 degrees) either way. */
+#define MOST_TILT 10.0f
+static inline floatv scatter_tilt(const inputs_t *in, const vector_t *v, floatv z, int dx, int dy)
+{
+    float focal = dx ? in->f->camera.focal[0] : in->f->camera.focal[1];
+    return clamp(scatter_slope(in->depth, in->stencil, in->f, v, dx, dy) * (focal / z), -MOST_TILT, MOST_TILT);
 }
 
 /* Area of the surface that a pixel sees, m² on the plane z = -1 times f_x·f_y: |dP/dx × dP/dy| of

@@ -30,13 +30,6 @@ enum { ROTATION_NONE = 0, ROTATION_PHASE = 1 };
 #define TABLE_TURNS 0
 #define TABLE_TAPS  (2 * TURNS)
 
-typedef struct inputs_t {
-    global const float *diffuse, *depth, *area;
-    global const uint *stencil;
-    constant float *tables;
-    constant frame_t *f;
-} inputs_t;
-
 /* What is constant for some lanes of a vector. */
 typedef struct group_t {
     vector_t v;
@@ -46,6 +39,7 @@ typedef struct group_t {
     float k[2];        /* pixels a d at the middle depth */
     float fall[3];     /* exponents of 2 a unit of r_u: -d_max / (3 d ln 2) */
     float turn[2];     /* cos, sin of the pattern's turn */
+    float squeeze[3];  /* xx, xy, yy: from the disk to the screen's plane, less the identity */
     int material;
     intv keep;         /* all bits: samples that are none count as black */
 } group_t;
@@ -83,6 +77,11 @@ static inline void place_taps(const inputs_t *in, const group_t *g, constant flo
     for (; i < n; i += RL_W) {
         floatv x = rl_vload(0, taps + first + i), y = rl_vload(0, taps + stride + first + i);
         floatv u = fma(x, (floatv)g->turn[0], -(y * g->turn[1])), v = fma(x, (floatv)g->turn[1], y * g->turn[0]);
+#if P_orientation == ORIENTATION_TANGENT
+        floatv flat = u;
+        u = fma(v, (floatv)g->squeeze[1], fma(u, (floatv)g->squeeze[0], u));
+        v = fma(flat, (floatv)g->squeeze[1], fma(v, (floatv)g->squeeze[2], v));
+#endif
         intv dx = rl_as_intv(fma(u, (floatv)g->k[0], (floatv)magic)) - as_int(magic);
         intv dy = rl_as_intv(fma(v, (floatv)g->k[1], (floatv)magic)) - as_int(magic);
         dx += g->v.px;
@@ -92,7 +91,7 @@ static inline void place_taps(const inputs_t *in, const group_t *g, constant flo
         intv a = (((dy & 3) * 4 + (dx & 3)) * rows4 + row) * f->stride4 + RL_MARGIN4 + column;
         intv inside = (row >= 0) & (row < rows4);
         rl_vstore(a & inside, 0, at + i); /* index 0 is a margin: no material */
-        rl_vstore(fma(x, x, y * y), 0, r2 + i);
+        rl_vstore(fma(u, u, v * v), 0, r2 + i);
         rl_vstore(rl_vload(0, taps + 2 * stride + first + i), 0, weight + i);
     }
     rl_vstore((intv)g->v.at, 0, at + i);
@@ -155,10 +154,38 @@ static inline floatv beyond(floatv rho, float threshold)
     return clamp((rho - 0.9f * threshold) * (5.0f / threshold), 0.0f, 1.0f);
 }
 
-/* The lanes `now` of the group, with the pattern that their size on screen asks for. */
-static inline void filter_group(const inputs_t *in, const group_t *g, constant params_t *p, intv now, floatv out[3])
+#if P_orientation == ORIENTATION_TANGENT
+static inline int sum_lanes(intv v)
 {
-    constant float *taps = in->tables + TABLE_TAPS;
+    int lanes[RL_W], sum = 0;
+    rl_vstore(v, 0, lanes);
+    for (int i = 0; i < RL_W; i++)
+        sum += lanes[i];
+    return sum;
+}
+
+/* Lays the disk into the mean tangent plane of the lanes `now`. Seen along the view axis it is squeezed by the cosine
+ * in the direction t of the slope: I + (cos - 1) t t'. Tilts are rounded to 1/1024, so that their sum is exact. */
+static inline void lay_disk(const inputs_t *in, group_t *g, intv now)
+{
+    const float magic = 12582912.0f;
+    floatv tx = scatter_tilt(in, &g->v, g->z, 1, 0), ty = scatter_tilt(in, &g->v, g->z, 0, 1);
+    intv ix = rl_as_intv(fma(tx, (floatv)1024.0f, (floatv)magic)) - as_int(magic);
+    intv iy = rl_as_intv(fma(ty, (floatv)1024.0f, (floatv)magic)) - as_int(magic);
+    float count = 1024.0f * (float)sum_lanes(now & 1);
+    float x = (float)sum_lanes(ix & now) / count, y = (float)sum_lanes(iy & now) / count;
+    float slope2 = fma(x, x, y * y), cosine = 1.0f / sqrt(1.0f + slope2);
+    float less = slope2 > 0.0f ? (cosine - 1.0f) / slope2 : 0.0f;
+    g->squeeze[0] = less * x * x;
+    g->squeeze[1] = less * x * y;
+    g->squeeze[2] = less * y * y;
+}
+#endif
+
+/* The lanes `now` of the group, with the pattern that their size on screen asks for. */
+static inline void filter_group(const inputs_t *in, const group_t *g, constant params_t *p, constant float *taps,
+                                intv now, floatv out[3])
+{
     floatv sum[3] = {out[0], out[1], out[2]};
     if (p->taps > 0) {
         sum_taps(in, g, taps, p->taps, sum);
@@ -182,8 +209,9 @@ static inline void filter_group(const inputs_t *in, const group_t *g, constant p
         out[c] = rl_select(out[c], sum[c], now);
 }
 
-static inline void filter_material(const inputs_t *in, const vector_t *v, constant params_t *p, int material,
-                                   constant material_t *mat, intv mine, floatv out[3])
+static inline void filter_material(const inputs_t *in, const vector_t *v, constant params_t *p,
+                                   constant float *tables, int material, constant material_t *mat, intv mine,
+                                   floatv out[3])
 {
     group_t g;
     constant float *d = mat->profile_scatter_distance_mm;
@@ -194,8 +222,8 @@ static inline void filter_material(const inputs_t *in, const vector_t *v, consta
     for (int c = 0; c < 3; c++)
         g.fall[c] = -0.480898347f * (most / d[c]);
     int turn = p->rotation == ROTATION_PHASE ? pattern_turn(p->seed, in->f->number, v->px, v->py) : 0;
-    g.turn[0] = in->tables[TABLE_TURNS + 2 * turn];
-    g.turn[1] = in->tables[TABLE_TURNS + 2 * turn + 1];
+    g.turn[0] = tables[TABLE_TURNS + 2 * turn];
+    g.turn[1] = tables[TABLE_TURNS + 2 * turn + 1];
     g.material = material;
     g.keep = mat->profile_border == BORDER_OCCLUDE ? -1 : 0;
     while (scatter_any(mine)) { /* once as a rule, more at silhouettes */
@@ -208,7 +236,10 @@ static inline void filter_material(const inputs_t *in, const vector_t *v, consta
         g.scale2 = s * s;
         g.k[0] = in->f->camera.focal[0] / (middle * g.inv_d);
         g.k[1] = in->f->camera.focal[1] / (middle * g.inv_d);
-        filter_group(in, &g, p, now, out);
+#if P_orientation == ORIENTATION_TANGENT
+        lay_disk(in, &g, now);
+#endif
+        filter_group(in, &g, p, tables + TABLE_TAPS, now, out);
     }
 }
 
@@ -217,7 +248,7 @@ kernel void sss_burley_filter(global const float *diffuse, global const float *l
                               global float *area, global float *filtered, global float *color, constant params_t *p,
                               constant frame_t *f, constant material_t *materials, constant float *tables)
 {
-    inputs_t in = {diffuse, depth, area, stencil, tables, f};
+    inputs_t in = {diffuse, depth, area, stencil, f};
     vector_t v = scatter_vector(f);
     intv id = rl_as_intv(rl_vload(0, stencil + v.at)), left = id != 0;
     if (!scatter_any(left))
@@ -230,7 +261,7 @@ kernel void sss_burley_filter(global const float *diffuse, global const float *l
         intv mine = left & (id == m);
         left &= ~mine;
         if (materials[m].has_profile)
-            filter_material(&in, &v, p, m, &materials[m], mine, out);
+            filter_material(&in, &v, p, tables, m, &materials[m], mine, out);
     }
     for (int c = 0; c < 3; c++)
         rl_vstore(out[c], 0, filtered + c * f->plane4 + v.at);

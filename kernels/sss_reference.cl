@@ -9,9 +9,14 @@ typedef struct sums_t {
 
 /* What is constant for the pixels of one vector and one material. */
 typedef struct centre_t {
+    vector_t v;
     floatv z;
+    floatv tilt_x, tilt_y; /* of the disk, depth a metre of the screen's plane */
     float d[3];
+    float reach;
     float px, py; /* a pixel's size on the plane z = -1 */
+    int material;
+    intv keep; /* all bits: samples that are none count as black */
 } centre_t;
 
 /* R(sqrt(r2)) for the three channels, without the factor 1/(8 pi). */
@@ -57,18 +62,20 @@ static inline void burley_own(const centre_t *at, floatv w[3])
 }
 
 /* The pixels (dx, dy) away join the sums of the lanes in `mine`. */
-static inline void gather(global const float *diffuse, global const float *depth, global const uint *stencil,
-                          global const float *area, constant frame_t *f, const vector_t *v, const centre_t *at,
-                          int material, intv keep, float reach2, int dx, int dy, intv mine, sums_t *s)
+static inline void gather(const inputs_t *in, const centre_t *at, int dx, int dy, intv mine, sums_t *s)
 {
     float x = (float)dx * at->px, y = (float)dy * at->py;
-    floatv r2 = at->z * at->z * (x * x + y * y);
-    intv near = mine & (r2 <= reach2);
-    if (!scatter_any(near))
+    floatv z2 = at->z * at->z, r2 = z2 * (x * x + y * y), disk2 = r2;
+#if P_orientation == ORIENTATION_TANGENT
+    floatv rise = at->tilt_x * x + at->tilt_y * y;
+    disk2 += z2 * rise * rise;
+#endif
+    int i = scatter_at(in->f, &at->v, dx, dy);
+    intv near = mine & (disk2 <= at->reach * at->reach);
+    intv same = near & (rl_as_intv(rl_vload(0, in->stencil + i)) == at->material), counts = near & (same | at->keep);
+    if (!scatter_any(counts))
         return;
-    int i = scatter_at(f, v, dx, dy);
-    intv same = near & (rl_as_intv(rl_vload(0, stencil + i)) == material);
-    floatv dz = scatter_keep(rl_vload(0, depth + i) - at->z, same), w[3];
+    floatv dz = scatter_keep(rl_vload(0, in->depth + i) - at->z, same), w[3];
     int ring = max(abs(dx), abs(dy));
     if (ring == 0)
         burley_own(at, w);
@@ -77,39 +84,44 @@ static inline void gather(global const float *diffuse, global const float *depth
     else
         burley(fma(dz, dz, r2), at->d, w);
 #if P_weighting == WEIGHTING_AREA
-    floatv surface = rl_select(rl_vload(0, area + v->at), rl_vload(0, area + i), same);
+    floatv surface = rl_select(rl_vload(0, in->area + at->v.at), rl_vload(0, in->area + i), same);
 #endif
     for (int c = 0; c < 3; c++) {
 #if P_weighting == WEIGHTING_AREA
         w[c] *= surface;
 #endif
-        w[c] = scatter_keep(w[c], near & (same | keep));
+        w[c] = scatter_keep(w[c], counts);
         s->w[c] += w[c];
-        s->c[c] = fma(w[c], scatter_keep(rl_vload(0, diffuse + c * f->plane4 + i), same), s->c[c]);
+        s->c[c] = fma(w[c], scatter_keep(rl_vload(0, in->diffuse + c * in->f->plane4 + i), same), s->c[c]);
     }
 }
 
-static inline void filter_material(global const float *diffuse, global const float *depth, global const uint *stencil,
-                                   global const float *area, constant frame_t *f, const vector_t *v, int material,
-                                   constant material_t *mat, intv mine, floatv out[3])
+static inline void filter_material(const inputs_t *in, const vector_t *v, int material, constant material_t *mat,
+                                   intv mine, floatv out[3])
 {
     centre_t at;
-    at.z = rl_vload(0, depth + v->at);
-    at.px = 1.0f / f->camera.focal[0];
-    at.py = 1.0f / f->camera.focal[1];
+    at.v = *v;
+    at.z = rl_vload(0, in->depth + v->at);
+#if P_orientation == ORIENTATION_TANGENT
+    at.tilt_x = scatter_tilt(in, v, at.z, 1, 0);
+    at.tilt_y = scatter_tilt(in, v, at.z, 0, 1);
+#endif
+    at.px = 1.0f / in->f->camera.focal[0];
+    at.py = 1.0f / in->f->camera.focal[1];
     for (int c = 0; c < 3; c++)
         at.d[c] = mat->profile_scatter_distance_mm[c] * 1e-3f;
-    intv keep = mat->profile_border == BORDER_OCCLUDE ? -1 : 0;
-    float reach = BURLEY_RADIUS * fmax(at.d[0], fmax(at.d[1], at.d[2]));
+    at.material = material;
+    at.keep = mat->profile_border == BORDER_OCCLUDE ? -1 : 0;
+    at.reach = BURLEY_RADIUS * fmax(at.d[0], fmax(at.d[1], at.d[2]));
     float nearest = scatter_nearest(at.z, mine);
-    int ry = (int)fmin(reach / (nearest * at.py), 16384.0f);
+    int ry = (int)fmin(at.reach / (nearest * at.py), 16384.0f);
     sums_t total = {{0.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 0.0f}};
     for (int dy = -ry; dy <= ry; dy++) {
         float y = (float)dy * at.py * nearest;
-        int rx = (int)fmin(sqrt(fmax(reach * reach - y * y, 0.0f)) / (nearest * at.px), 16384.0f) + 1;
+        int rx = (int)fmin(sqrt(fmax(at.reach * at.reach - y * y, 0.0f)) / (nearest * at.px), 16384.0f) + 1;
         sums_t row = {{0.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 0.0f}}; /* rows first: less is lost to rounding */
         for (int dx = -rx; dx <= rx; dx++)
-            gather(diffuse, depth, stencil, area, f, v, &at, material, keep, reach * reach, dx, dy, mine, &row);
+            gather(in, &at, dx, dy, mine, &row);
         for (int c = 0; c < 3; c++) {
             total.w[c] += row.w[c];
             total.c[c] += row.c[c];
@@ -124,6 +136,7 @@ kernel void sss_reference_filter(global const float *diffuse, global const float
                                  global float *area, global float *filtered, global float *color,
                                  constant params_t *p, constant frame_t *f, constant material_t *materials)
 {
+    inputs_t in = {diffuse, depth, area, stencil, f};
     vector_t v = scatter_vector(f);
     intv id = rl_as_intv(rl_vload(0, stencil + v.at)), left = id != 0;
     floatv out[3];
@@ -134,7 +147,7 @@ kernel void sss_reference_filter(global const float *diffuse, global const float
         intv mine = id == m;
         left &= ~mine;
         if (materials[m].has_profile)
-            filter_material(diffuse, depth, stencil, area, f, &v, m, &materials[m], mine, out);
+            filter_material(&in, &v, m, &materials[m], mine, out);
     }
     for (int c = 0; c < 3; c++)
         rl_vstore(out[c], 0, filtered + c * f->plane4 + v.at);

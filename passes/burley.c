@@ -3,6 +3,8 @@
 
 #include <math.h>
 
+#include "passes/shading_rows.h"
+
 static const double pi = 3.14159265358979323846;
 
 double rl_burley_profile(double r, double d)
@@ -41,19 +43,13 @@ void rl_burley_taps(size_t n, float *x, float *y, float *weight)
 }
 
 const rl_param rl_scatter_profile_rows[RL_SCATTER_PROFILE_ROWS] = {
-    M(RL_RGBF, scatter_distance_mm, 1e-4, 1e4, 0, "mm",
-      "scattering distance d = 1/s a channel, for Burley's profile", .source = "Christensen and Burley 2015",
-      .required = true),
-    M_ENUM(texturing, "post|pre_post", 0, "albedo on the way out, or its square root on both ways",
-           .source = "d'Eon 2007"),
+    RL_ROW_SCATTER_DISTANCE,
+    RL_ROW_TEXTURING,
     M_ENUM(border, "renormalize|occlude", 0,
            "samples of other materials and outside of the image: not counted, or black"),
 };
 
 const rl_param rl_scatter_shading_rows[RL_SCATTER_SHADING_ROWS] = {
-    M_ENUM(diffuse, "disney|lambert", 0, "how light crosses the surface, on the way in and on the way out",
-           .source = "Burley 2015"),
-    M_ENUM(exit_transmission, "sss|lighting", 0,
-           "where the way out is applied: behind the filter, or before it as in the talk",
-           .source = "Golubev 2018"),
+    RL_ROW_DIFFUSE,
+    RL_ROW_EXIT_TRANSMISSION,
 };

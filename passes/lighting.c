@@ -11,7 +11,7 @@ static const rl_param profile_keys[] = {
     M_ENUM(transmission, "none|thin|thick|beer_lambert", 0, "light that comes through from the back face",
            .source = "Golubev 2018; Helix"),
     M_ENUM(thickness_from, "max|layer|shadow", 0,
-           "how thick transmission is taken to be: thickness layer, shadow_thickness, or the larger",
+           "thick, beer_lambert: the thickness layer, shadow_thickness along the normal, or the larger",
            .source = "Golubev 2018"),
     M(RL_RGBF, transmittance_color, 1e-6, 1, 0.5, "ratio",
       "beer_lambert: what is left of white light after transmittance_distance_mm", .source = "Bavoil, Helix"),

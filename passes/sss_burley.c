@@ -5,6 +5,7 @@
 
 typedef struct sss_burley_params {
     int32_t taps;
+    int32_t orientation;
     int32_t weighting;
     int32_t rotation;
     int32_t seed;
@@ -13,6 +14,9 @@ typedef struct sss_burley_params {
 static const rl_param params[] = {
     P(sss_burley_params, RL_I32, taps, 1, 4096, -1, "samples a pixel",
       "auto: none, 21 or 55 by the filter's radius in pixels; a number forces that many", .words = "auto"),
+    P_ENUM(sss_burley_params, orientation, "screen|tangent", 0,
+           "the disk is parallel to the screen, or to the tangent plane that the depth gives",
+           .structural = true),
     P_ENUM(sss_burley_params, weighting, "area|plain", 0,
            "what a sample stands for: the surface that its pixel sees, or its pixel alone",
            .structural = true),
@@ -20,23 +24,23 @@ static const rl_param params[] = {
            "turn the pattern: never, or for each of 4x4 pixels and each frame"),
     P(sss_burley_params, RL_I32, seed, 0, 2147483647, 0, "", "another choice of turns"),
 };
-RL_PARAMS_MATCH(sss_burley_params, 4);
+RL_PARAMS_MATCH(sss_burley_params, 5);
 
 static const rl_port ports[] = {
-    {"diffuse",            RL_READ,                   RL_RGB,                     .help = "radiance below the surface", .layout = RL_PHASE4},
-    {"lit",                    RL_READ,                                         RL_RGB,                                         .help = "radiance that does not scatter"                              },
-    {"albedo",                    RL_READ,                                      RL_RGB,                                      .help = "0..1"},
-    {"normal",                    RL_READ,                                      RL_NORMAL,                                      .help = "shading normal, for the way out"                           },
-    {"depth",                    RL_READ,                                       RL_SCALAR,                                       .help = "planar, metres", .layout = RL_PHASE4},
-    {"stencil", RL_READ,                          RL_ID,                                            .help = "material",                                                                         .layout = RL_PHASE4},
-    {"area",  RL_SCRATCH,        RL_SCALAR,.help = "surface that a pixel sees",.layout = RL_PHASE4},
-    {"filtered",           RL_SCRATCH,RL_RGB,           .help = "scattered radiance below the surface",                                                                                                  .layout = RL_PHASE4},
-    {"color",RL_WRITE,                          RL_RGB,.help = "radiance, scene-linear"},
+    {"diffuse", RL_READ, RL_RGB, .help = "radiance below the surface", .layout = RL_PHASE4},
+    {"lit", RL_READ, RL_RGB, .help = "radiance that does not scatter"},
+    {"albedo", RL_READ, RL_RGB, .help = "0..1"},
+    {"normal", RL_READ, RL_NORMAL, .help = "shading normal, for the way out"},
+    {"depth", RL_READ, RL_SCALAR, .help = "planar, metres", .layout = RL_PHASE4},
+    {"stencil", RL_READ, RL_ID, .help = "material", .layout = RL_PHASE4},
+    {"area", RL_SCRATCH, RL_SCALAR, .help = "surface that a pixel sees", .layout = RL_PHASE4},
+    {"filtered", RL_SCRATCH, RL_RGB, .help = "scattered radiance below the surface", .layout = RL_PHASE4},
+    {"color", RL_WRITE, RL_RGB, .help = "radiance, scene-linear"},
 };
 
 static const rl_step steps[] = {
-    {"sss_burley_area",    .domain = RL_EVERY_PHASE },
-    {"sss_burley_filter",  .domain = RL_EVERY_PHASE },
+    {"sss_burley_area", .domain = RL_EVERY_PHASE},
+    {"sss_burley_filter", .domain = RL_EVERY_PHASE},
     {"sss_burley_resolve", .domain = RL_EVERY_VECTOR},
 };
 

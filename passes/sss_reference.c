@@ -4,31 +4,35 @@
 #include "passes/burley.h"
 
 typedef struct sss_reference_params {
+    int32_t orientation;
     int32_t weighting;
 } sss_reference_params;
 
 static const rl_param params[] = {
+    P_ENUM(sss_reference_params, orientation, "screen|tangent", 0,
+           "the disk is parallel to the screen, or to the tangent plane that the depth gives",
+           .structural = true),
     P_ENUM(sss_reference_params, weighting, "area|plain", 0,
            "what a sample stands for: the surface that its pixel sees, or its pixel alone",
            .structural = true),
 };
-RL_PARAMS_MATCH(sss_reference_params, 1);
+RL_PARAMS_MATCH(sss_reference_params, 2);
 
 static const rl_port ports[] = {
-    {"diffuse",            RL_READ,                   RL_RGB,                     .help = "radiance below the surface", .layout = RL_PHASE4},
-    {"lit",                    RL_READ,                                         RL_RGB,                                         .help = "radiance that does not scatter"                              },
-    {"albedo",                    RL_READ,                                      RL_RGB,                                      .help = "0..1"},
-    {"normal",                    RL_READ,                                      RL_NORMAL,                                      .help = "shading normal, for the way out"                           },
-    {"depth",                    RL_READ,                                       RL_SCALAR,                                       .help = "planar, metres", .layout = RL_PHASE4},
-    {"stencil", RL_READ,                          RL_ID,                                            .help = "material",                                                                         .layout = RL_PHASE4},
-    {"area",  RL_SCRATCH,        RL_SCALAR,.help = "surface that a pixel sees",.layout = RL_PHASE4},
-    {"filtered",           RL_SCRATCH,RL_RGB,           .help = "scattered radiance below the surface",                                                                                                  .layout = RL_PHASE4},
-    {"color",RL_WRITE,                          RL_RGB,.help = "radiance, scene-linear"},
+    {"diffuse", RL_READ, RL_RGB, .help = "radiance below the surface", .layout = RL_PHASE4},
+    {"lit", RL_READ, RL_RGB, .help = "radiance that does not scatter"},
+    {"albedo", RL_READ, RL_RGB, .help = "0..1"},
+    {"normal", RL_READ, RL_NORMAL, .help = "shading normal, for the way out"},
+    {"depth", RL_READ, RL_SCALAR, .help = "planar, metres", .layout = RL_PHASE4},
+    {"stencil", RL_READ, RL_ID, .help = "material", .layout = RL_PHASE4},
+    {"area", RL_SCRATCH, RL_SCALAR, .help = "surface that a pixel sees", .layout = RL_PHASE4},
+    {"filtered", RL_SCRATCH, RL_RGB, .help = "scattered radiance below the surface", .layout = RL_PHASE4},
+    {"color", RL_WRITE, RL_RGB, .help = "radiance, scene-linear"},
 };
 
 static const rl_step steps[] = {
-    {"sss_reference_area",    .domain = RL_EVERY_PHASE },
-    {"sss_reference_filter",  .domain = RL_EVERY_PHASE },
+    {"sss_reference_area", .domain = RL_EVERY_PHASE},
+    {"sss_reference_filter", .domain = RL_EVERY_PHASE},
     {"sss_reference_resolve", .domain = RL_EVERY_VECTOR},
 };
 

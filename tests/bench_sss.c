@@ -1,5 +1,6 @@
-/* How much faster sss_burley is than the talk's per-pixel kernel (tests/peers/talk_sss.cl), on the same device in one
- * run, and that both are the same filter: their noise against 4,096 taps. Not a test; run from the project's folder:
+/* How much faster sss_burley is than the talk's per-pixel kernel (tests/peers/talk_sss.cl), on the same
+ * device in one run, and that both are the same filter: their noise against 4,096 taps. Not a test; run from
+ * the project's folder:
  *
  *     make build/tests/bench_sss && build/tests/bench_sss
  */
@@ -19,7 +20,10 @@ extern const rl_pass rl_pass_sss_burley;
 enum { WIDTH = 1920, HEIGHT = 1080, REPEAT = 10 };
 
 static const twin_material materials[3] = {
-    {0, {0, 0, 0}, 0, 0, 0, 0}, {1, {3.0f, 1.2f, 0.7f}, 0, 0, 0, 0}, {1, {6, 5, 3}, 1, 0, 0, 0}};
+    {0, {0, 0, 0},          0, 0, 0, 0},
+    {1, {3.0f, 1.2f, 0.7f}, 0, 0, 0, 0},
+    {1, {6, 5, 3},          1, 0, 0, 0}
+};
 
 /* As peers/talk_sss.cl has it. */
 typedef struct peer_material {
@@ -42,21 +46,28 @@ static void fill(scene *s)
     static const struct {
         float x, y, radius;
         uint32_t id;
-    } balls[] = {{680, 540, 530, 1}, {1540, 420, 300, 2}, {1450, 900, 170, 1}};
+    } balls[] = {
+        {680,  540, 530, 1},
+        {1540, 420, 300, 2},
+        {1450, 900, 170, 1}
+    };
     size_t covered = 0;
     for (int y = 0; y < HEIGHT; y++)
         for (int x = 0; x < WIDTH; x++) {
             size_t i = (size_t)y * (size_t)s->frame.columns + (size_t)x;
             float metre = 0.75f / s->frame.camera.focal[0]; /* of a pixel */
             for (size_t k = 0; k < 3; k++) {
-                float u = ((float)x - balls[k].x) / balls[k].radius, v = ((float)y - balls[k].y) / balls[k].radius;
+                float u = ((float)x - balls[k].x) / balls[k].radius,
+                      v = ((float)y - balls[k].y) / balls[k].radius;
                 float w = 1 - u * u - v * v;
                 if (w <= 0)
                     continue;
                 w = sqrtf(w);
-                float light = fmaxf(0, 0.6f * u - 0.5f * v + 0.62f * w) * (sinf(0.03f * (float)(x + y)) > -0.6f);
+                float light =
+                    fmaxf(0, 0.6f * u - 0.5f * v + 0.62f * w) * (sinf(0.03f * (float)(x + y)) > -0.6f);
                 s->stencil[i] = balls[k].id;
-                s->depth[i] = 0.75f - w * balls[k].radius * metre + 0.0002f * sinf(0.2f * (float)x) * cosf(0.3f * (float)y);
+                s->depth[i] = 0.75f - w * balls[k].radius * metre +
+                              0.0002f * sinf(0.2f * (float)x) * cosf(0.3f * (float)y);
                 s->normal[i] = u;
                 s->normal[s->n + i] = -v;
                 s->normal[2 * s->n + i] = w;
@@ -77,7 +88,8 @@ static bool scene_make(scene *s, float focal)
     memset(s, 0, sizeof *s);
     cl_frame(&s->frame, 0, 0, WIDTH, HEIGHT, focal);
     s->n = (size_t)s->frame.columns * (size_t)s->frame.rows;
-    float **planes[] = {&s->diffuse, &s->lit, &s->albedo, &s->normal, &s->ours, &s->talk, &s->truth, &s->depth};
+    float **planes[] = {&s->diffuse, &s->lit,  &s->albedo, &s->normal,
+                        &s->ours,    &s->talk, &s->truth,  &s->depth};
     for (size_t i = 0; i < 8; i++)
         *planes[i] = rl_calloc(3 * s->n, 4);
     s->stencil = rl_calloc(s->n, 4);
@@ -90,7 +102,7 @@ static bool scene_make(scene *s, float focal)
 
 static void scene_free(scene *s)
 {
-    float *planes[] = {s->diffuse, s->lit,   s->albedo, s->normal, s->ours,
+    float *planes[] = {s->diffuse, s->lit,   s->albedo, s->normal,          s->ours,
                        s->talk,    s->truth, s->depth,  (float *)s->stencil};
     for (size_t i = 0; i < 9; i++)
         rl_free(planes[i]);
@@ -99,13 +111,20 @@ static void scene_free(scene *s)
 static double run_ours(cl_session *session, const scene *s, int taps, int repeat, float *color)
 {
     const struct {
-        int32_t taps, weighting, rotation, seed;
-    } params = {taps, 1, 1, 0};
-    const cl_image images[] = {{"diffuse", s->diffuse, NULL}, {"lit", s->lit, NULL},     {"albedo", s->albedo, NULL},
-                               {"normal", s->normal, NULL},   {"depth", s->depth, NULL}, {"stencil", s->stencil, NULL},
-                               {"color", NULL, color}};
+        int32_t taps, orientation, weighting, rotation, seed;
+    } params = {taps, 0, 1, 1, 0};
+    const cl_image images[] = {
+        {"diffuse", s->diffuse, NULL },
+        {"lit",     s->lit,     NULL },
+        {"albedo",  s->albedo,  NULL },
+        {"normal",  s->normal,  NULL },
+        {"depth",   s->depth,   NULL },
+        {"stencil", s->stencil, NULL },
+        {"color",   NULL,       color}
+    };
     double ms[3] = {0};
-    cl_job job = {&rl_pass_sss_burley, &s->frame, &params, materials, sizeof materials, images, 7, repeat, ms, NULL};
+    cl_job job = {
+        &rl_pass_sss_burley, &s->frame, &params, materials, sizeof materials, images, 7, repeat, ms, 0};
     return cl_run(session, &job) ? ms[0] + ms[1] + ms[2] : -1;
 }
 
@@ -137,18 +156,30 @@ static double run_talk(cl_session *session, const scene *s, int taps, int repeat
         table[3 * i + 2] = weight[i];
     }
     for (int m = 0; m < 3; m++) {
-        peers[m] = (peer_material){materials[m].has_profile, {0}, materials[m].texturing, materials[m].diffuse == 0};
+        peers[m] =
+            (peer_material){materials[m].has_profile, {0}, materials[m].texturing, materials[m].diffuse == 0};
         for (int c = 0; c < 3; c++)
             peers[m].d[c] = materials[m].scatter_distance_mm[c] * 1e-3f;
     }
     memcpy(to_world, s->frame.camera.to_world, sizeof to_world);
-    const cl_buffer buffers[] = {{s->diffuse, s->n * 12, false}, {s->lit, s->n * 12, false},
-                                 {s->albedo, s->n * 12, false},  {s->normal, s->n * 12, false},
-                                 {s->depth, s->n * 4, false},    {s->stencil, s->n * 4, false},
-                                 {s->talk, s->n * 12, true},     {table, sizeof table, false},
-                                 {peers, sizeof peers, false},   {to_world, sizeof to_world, false}};
+    const cl_buffer buffers[] = {
+        {s->diffuse, s->n * 12,       false},
+        {s->lit,     s->n * 12,       false},
+        {s->albedo,  s->n * 12,       false},
+        {s->normal,  s->n * 12,       false},
+        {s->depth,   s->n * 4,        false},
+        {s->stencil, s->n * 4,        false},
+        {s->talk,    s->n * 12,       true },
+        {table,      sizeof table,    false},
+        {peers,      sizeof peers,    false},
+        {to_world,   sizeof to_world, false}
+    };
     char *text = talk_text(s, taps);
-    size_t global[2] = {(size_t)s->frame.columns, (size_t)s->frame.rows}, best_local[2][2] = {{64, 1}, {8, 4}};
+    size_t global[2] =
+        {
+            (size_t)s->frame.columns, (size_t)s->frame.rows
+    },
+           best_local[2][2] = {{64, 1}, {8, 4}};
     double best = -1;
     for (int i = 0; i < 2 && text; i++) { /* the local size that suits it better */
         double ms = cl_run_text(session, text, "talk_sss", buffers, 10, global, best_local[i], repeat);
@@ -190,14 +221,15 @@ int main(void)
         for (size_t t = 0; t < 2; t++) {
             double ours = 1e30, talk = 1e30;
             for (int round = 0; round < 3; round++) { /* in turns, as the machine's speed drifts */
-                double a = run_ours(session, &s, taps[t], REPEAT, s.ours), b = run_talk(session, &s, taps[t], 2);
+                double a = run_ours(session, &s, taps[t], REPEAT, s.ours),
+                       b = run_talk(session, &s, taps[t], 2);
                 if (a < 0 || b < 0)
                     goto done;
                 ours = fmin(ours, a);
                 talk = fmin(talk, b);
             }
-            printf("  %d taps: sss_burley %.1f ms, talk %.1f ms, ratio %.1f; noise %.2e and %.2e\n", taps[t], ours,
-                   talk, talk / ours, noise(&s, s.ours), noise(&s, s.talk));
+            printf("  %d taps: sss_burley %.1f ms, talk %.1f ms, ratio %.1f; noise %.2e and %.2e\n", taps[t],
+                   ours, talk, talk / ours, noise(&s, s.ours), noise(&s, s.talk));
         }
         scene_free(&s);
         memset(&s, 0, sizeof s);

@@ -10,7 +10,7 @@
 #include "graph/base/alloc.h"
 #include "graph/base/text.h"
 
-#define KEPT 32
+#define KEPT    32
 #define OPTIONS "-cl-std=CL1.2 -cl-mad-enable -cl-no-signed-zeros -cl-finite-math-only"
 
 struct cl_session {
@@ -142,8 +142,8 @@ static void move_image(const frame_t *f, const rl_port *port, float *device, con
 static const cl_image *image_of(const cl_job *job, const rl_port *port)
 {
     for (size_t i = 0; i < job->n_images; i++)
-        if (!strcmp(job->images[i].port, port->name) && (port->role == RL_READ ? !job->images[i].write
-                                                                                : !!job->images[i].write))
+        if (!strcmp(job->images[i].port, port->name) &&
+            (port->role == RL_READ ? !job->images[i].write : !!job->images[i].write))
             return &job->images[i];
     return NULL;
 }
@@ -217,10 +217,16 @@ static bool add_file(rl_str *s, const char *name)
     return true;
 }
 
+static int width_of(const cl_job *job)
+{
+    return job->width ? job->width : 16;
+}
+
 static bool program_text(const cl_job *job, rl_str *s)
 {
     const rl_pass *pass = job->pass;
     bool ok = add_file(s, "shared.h");
+    rl_str_printf(s, "#define RL_W %d\n", width_of(job));
     rl_str_printf(s, "typedef struct params_t {\n");
     add_fields(s, &pass->params, "");
     rl_str_printf(s, "} params_t;\ntypedef struct material_t {\n    int has_profile;\n");
@@ -243,7 +249,7 @@ static bool program_text(const cl_job *job, rl_str *s)
     return ok && add_file(s, pass->kernel) && !s->failed;
 }
 
-static cl_program build(cl_session *s, const char *text, const char *options)
+static cl_program build(cl_session *s, const char *text)
 {
     for (int i = 0; i < s->n_kept; i++)
         if (!strcmp(s->kept[i].text, text))
@@ -252,9 +258,7 @@ static cl_program build(cl_session *s, const char *text, const char *options)
     cl_program program = clCreateProgramWithSource(s->context, 1, &text, NULL, &code);
     if (failed("clCreateProgramWithSource", code))
         return NULL;
-    char all[512];
-    snprintf(all, sizeof all, OPTIONS " %s", options ? options : "");
-    code = clBuildProgram(program, 1, &s->device, all, NULL, NULL);
+    code = clBuildProgram(program, 1, &s->device, OPTIONS, NULL, NULL);
     char log[8192] = "";
     clGetProgramBuildInfo(program, s->device, CL_PROGRAM_BUILD_LOG, sizeof log - 1, log, NULL);
     if (code != CL_SUCCESS || strstr(log, "warning:"))
@@ -285,12 +289,13 @@ static bool add_buffer(cl_session *s, cl_args *a, void *data, size_t bytes)
     return !failed("clCreateBuffer", code);
 }
 
-static double run_kernel(cl_session *s, cl_kernel kernel, cl_uint dims, const size_t *global, const size_t *local)
+static double run_kernel(cl_session *s, cl_kernel kernel, cl_uint dims, const size_t *global,
+                         const size_t *local)
 {
     cl_event event;
     cl_ulong begin = 0, end = 0;
-    if (failed("clEnqueueNDRangeKernel", clEnqueueNDRangeKernel(s->queue, kernel, dims, NULL, global, local, 0,
-                                                                NULL, &event)))
+    if (failed("clEnqueueNDRangeKernel",
+               clEnqueueNDRangeKernel(s->queue, kernel, dims, NULL, global, local, 0, NULL, &event)))
         return -1;
     clWaitForEvents(1, &event);
     clGetEventProfilingInfo(event, CL_PROFILING_COMMAND_START, sizeof begin, &begin, NULL);
@@ -311,11 +316,11 @@ static double run_step(cl_session *s, const cl_job *job, cl_program program, con
     for (cl_uint i = 0; i < args->n; i++)
         if (failed(step->entry, clSetKernelArg(kernel, i, sizeof(cl_mem), &args->mem[i])))
             goto done;
-    size_t columns = (size_t)f->columns, rows = (size_t)f->rows;
+    size_t columns = (size_t)f->columns, rows = (size_t)f->rows, width = (size_t)width_of(job);
     if (step->domain == RL_EVERY_PHASE)
-        ms = run_kernel(s, kernel, 3, (size_t[]){16, columns / 64, rows / 4}, (size_t[]){16, 1, 1});
+        ms = run_kernel(s, kernel, 3, (size_t[]){16, columns / (4 * width), rows / 4}, (size_t[]){16, 1, 1});
     else if (step->domain == RL_EVERY_VECTOR)
-        ms = run_kernel(s, kernel, 2, (size_t[]){columns / 16, rows}, (size_t[]){4, 1});
+        ms = run_kernel(s, kernel, 2, (size_t[]){columns / width, rows}, (size_t[]){4, 1});
     else
         ms = run_kernel(s, kernel, 2, (size_t[]){columns, rows}, (size_t[]){64, 1});
 done:
@@ -347,16 +352,18 @@ bool cl_run(cl_session *s, const cl_job *job)
     rl_tables tables = {0};
     frame_t frame = *job->frame;
     bool ok = pass->ports.n <= 24 && program_text(job, &text);
-    cl_program program = ok ? build(s, text.text, job->options) : NULL;
+    cl_program program = ok ? build(s, text.text) : NULL;
     ok = program != NULL;
     for (size_t i = 0; ok && i < pass->ports.n; i++) {
         const rl_port *port = &pass->ports.rows[i];
         planes[i] = make_plane(job, port);
-        ok = (planes[i] || port->optional) && add_buffer(s, &args, planes[i], floats_of(job->frame, port) * 4);
+        ok =
+            (planes[i] || port->optional) && add_buffer(s, &args, planes[i], floats_of(job->frame, port) * 4);
         if (port->layout == RL_LINEAR && ok && planes[i]) { /* the kernel's pointer is behind the guard */
             cl_buffer_region region = {RL_GUARD * 4, (floats_of(job->frame, port) - RL_GUARD) * 4};
             cl_int code;
-            cl_mem part = clCreateSubBuffer(args.mem[args.n - 1], 0, CL_BUFFER_CREATE_TYPE_REGION, &region, &code);
+            cl_mem part =
+                clCreateSubBuffer(args.mem[args.n - 1], 0, CL_BUFFER_CREATE_TYPE_REGION, &region, &code);
             ok = !failed("clCreateSubBuffer", code);
             clReleaseMemObject(args.mem[args.n - 1]);
             args.mem[args.n - 1] = part;
@@ -399,7 +406,7 @@ double cl_run_text(cl_session *s, const char *text, const char *entry, const cl_
     double best = -1;
     cl_int code;
     cl_kernel kernel = NULL;
-    cl_program program = build(s, text, NULL);
+    cl_program program = build(s, text);
     if (!program)
         return -1;
     kernel = clCreateKernel(program, entry, &code);
@@ -417,8 +424,8 @@ double cl_run_text(cl_session *s, const char *text, const char *entry, const cl_
     }
     for (size_t i = 0; i < n; i++)
         if (buffers[i].write && failed("clEnqueueReadBuffer",
-                                       clEnqueueReadBuffer(s->queue, args.mem[i], CL_TRUE, 0, buffers[i].bytes,
-                                                           buffers[i].data, 0, NULL, NULL)))
+                                       clEnqueueReadBuffer(s->queue, args.mem[i], CL_TRUE, 0,
+                                                           buffers[i].bytes, buffers[i].data, 0, NULL, NULL)))
             best = -1;
 done:
     for (cl_uint i = 0; i < args.n; i++)

@@ -1,5 +1,5 @@
-/* Runs one pass by itself: from its descriptor and images in host memory to the images that it writes, with plain
- * OpenCL and no executor. For tests and benches; single-threaded; failures print and return false. */
+/* Runs one pass by itself: from its descriptor and images in host memory to the images that it writes, with
+ * plain OpenCL and no executor. For tests and benches; single-threaded; failures print and return false. */
 #ifndef RL_TESTS_CL_PASS_H
 #define RL_TESTS_CL_PASS_H
 
@@ -12,13 +12,14 @@
 
 typedef struct cl_session cl_session;
 
-/* The first OpenCL CPU device, else the first of any kind; threads > 0: only that many of its compute units. NULL
- * when there is none. Programs are kept until cl_close. */
+/* The first OpenCL CPU device, else the first of any kind; threads > 0: only that many of its compute units.
+ * NULL when there is none. Programs are kept until cl_close. */
 cl_session *cl_open(int threads);
 void cl_close(cl_session **s);
 
-/* Buffers for a data window of width × height whose upper left pixel is (x, y) of the display window; a camera that
- * looks from the origin, focal length `focal` pixels, centre of the window in the middle of the image. */
+/* Buffers for a data window of width × height whose upper left pixel is (x, y) of the display window; a
+ * camera that looks from the origin, focal length `focal` pixels, centre of the window in the middle of the
+ * image. */
 void cl_frame(frame_t *f, int x, int y, int width, int height, float focal);
 
 /* One image of a port: planes of columns × rows, tightly packed; uint32_t for RL_ID. */
@@ -28,8 +29,8 @@ typedef struct cl_image {
     float *write;     /* for RL_WRITE, and RL_SCRATCH when somebody wants to look at it */
 } cl_image;
 
-/* A pass's run. Entries of the material table: has_profile, then the pass's profile, material and shading rows in
- * their order, 4 bytes each (RGB rows three). */
+/* A pass's run. Entries of the material table: has_profile, then the pass's profile, material and shading
+ * rows in their order, 4 bytes each (RGB rows three). */
 typedef struct cl_job {
     const rl_pass *pass;
     const frame_t *frame;
@@ -38,15 +39,15 @@ typedef struct cl_job {
     size_t materials_bytes;
     const cl_image *images;
     size_t n_images;
-    int repeat;  /* runs, at least one; the fastest is reported */
-    double *ms;  /* one a step, or NULL */
-    const char *options; /* more build options, or NULL */
+    int repeat; /* runs, at least one; the fastest is reported */
+    double *ms; /* one a step, or NULL */
+    int width;  /* RL_W; 0 = 16 */
 } cl_job;
 
 bool cl_run(cl_session *s, const cl_job *job);
 
-/* A program of its own, for peers: source text, entry point, `n` buffers (bytes each; read back when `write`),
- * global and local size. Milliseconds of the fastest of `repeat` runs; negative on failure. */
+/* A program of its own, for peers: source text, entry point, `n` buffers (bytes each; read back when
+ * `write`), global and local size. Milliseconds of the fastest of `repeat` runs; negative on failure. */
 typedef struct cl_buffer {
     void *data;
     size_t bytes;

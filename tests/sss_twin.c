@@ -38,7 +38,8 @@ void twin_resolve(const twin_scene *s, int x, int y, const double filtered[3], d
     double dot = 0, length = sqrt(ray[0] * ray[0] + ray[1] * ray[1] + 1);
     for (int i = 0; i < 3; i++) {
         const float *row = c->to_world + 4 * i;
-        dot -= s->normal[i * plane(s) + at(s, x, y)] * (row[0] * ray[0] + row[1] * ray[1] + row[2] * ray[2]) / length;
+        dot -= s->normal[i * plane(s) + at(s, x, y)] * (row[0] * ray[0] + row[1] * ray[1] + row[2] * ray[2]) /
+               length;
     }
     double out = 1;
     if (m->diffuse == 0 && m->exit_transmission == 0)
@@ -56,18 +57,30 @@ void twin_resolve(const twin_scene *s, int x, int y, const double filtered[3], d
 static double slope(const twin_scene *s, int x, int y, int dx, int dy)
 {
     uint32_t id = material_at(s, x, y);
-    double z = s->depth[at(s, x, y)], best = 0;
+    float z = s->depth[at(s, x, y)];
+    double best = 0;
     bool have = false;
     for (int sign = 1; sign >= -1; sign -= 2) {
         int nx = x + sign * dx, ny = y + sign * dy;
         if (material_at(s, nx, ny) != id)
             continue;
-        double d = sign * (s->depth[at(s, nx, ny)] - z);
+        double d = (double)sign * (double)(s->depth[at(s, nx, ny)] - z);
         if (!have || fabs(d) < fabs(best))
             best = d;
         have = true;
     }
     return best;
+}
+
+/* Slopes of the disk, depth a metre of the screen's plane. In float: they decide where taps land. */
+static void tilt(const twin_scene *s, int x, int y, float t[2])
+{
+    const camera_t *c = &s->frame.camera;
+    float z = s->depth[at(s, x, y)];
+    for (int i = 0; i < 2; i++) {
+        t[i] = (float)slope(s, x, y, i == 0, i == 1) * (c->focal[i] / z);
+        t[i] = s->tangent ? fminf(fmaxf(t[i], -10), 10) : 0;
+    }
 }
 
 /* |dP/dx × dP/dy| of the view-space point. */
@@ -80,7 +93,8 @@ static double area_of(const twin_scene *s, int x, int y)
     double z = s->depth[at(s, x, y)], zx = slope(s, x, y, 1, 0), zy = slope(s, x, y, 0, 1);
     double rx = (x + f->origin[0] + 0.5 + c->jitter[0] - c->centre[0]) / c->focal[0];
     double ry = -(y + f->origin[1] + 0.5 + c->jitter[1] - c->centre[1]) / c->focal[1];
-    double a[3] = {z / c->focal[0] + rx * zx, ry * zx, -zx}, b[3] = {rx * zy, -z / c->focal[1] + ry * zy, -zy};
+    double a[3] = {z / c->focal[0] + rx * zx, ry * zx, -zx},
+           b[3] = {rx * zy, -z / c->focal[1] + ry * zy, -zy};
     double n[3] = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
     return sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
 }
@@ -140,10 +154,12 @@ void twin_reference(const twin_scene *s, int x, int y, double filtered[3])
         most = fmax(most, d[i]);
     }
     double reach = RL_BURLEY_RADIUS * most;
+    float t[2];
+    tilt(s, x, y, t);
     int rx = (int)(reach / hx) + 1, ry = (int)(reach / hy) + 1;
     for (int dy = -ry; dy <= ry; dy++)
         for (int dx = -rx; dx <= rx; dx++) {
-            if (hypot(dx * hx, dy * hy) > reach)
+            if (hypot(hypot(dx * hx, dy * hy), (double)t[0] * dx * hx + (double)t[1] * dy * hy) > reach)
                 continue;
             bool same = material_at(s, x + dx, y + dy) == id;
             if (!same && m->border == 0)
@@ -163,9 +179,10 @@ void twin_reference(const twin_scene *s, int x, int y, double filtered[3])
 
 /* ---- taps ---- */
 
-/* The depth that sets the scale of the taps for pixel (x, y): of the lanes of its vector (64 columns, one phase) with
- * its material, groups are split off from the far end. In float, as the scale decides where taps land. */
-static float middle_depth(const twin_scene *s, int x, int y)
+/* The scale of the taps for pixel (x, y), a depth, and the mean slopes of their disk: of the lanes of its
+ * vector (64 columns, one phase) with its material, groups are split off from the far end. In float, as the
+ * scale decides where taps land. */
+static float group_of(const twin_scene *s, int x, int y, float slopes[2])
 {
     uint32_t id = s->stencil[at(s, x, y)];
     float z = s->depth[at(s, x, y)], beyond = INFINITY;
@@ -174,14 +191,23 @@ static float middle_depth(const twin_scene *s, int x, int y)
         for (int i = 0, px = (x & ~63) + (x & 3); i < 16; i++, px += 4)
             if (material_at(s, px, y) == id && s->depth[at(s, px, y)] < beyond)
                 far = fmaxf(far, s->depth[at(s, px, y)]);
-        float limit = 0.8f * far;
+        float limit = 0.8f * far, t[2];
+        long count = 0, sum[2] = {0};
         for (int i = 0, px = (x & ~63) + (x & 3); i < 16; i++, px += 4) {
             float pz = s->depth[at(s, px, y)];
-            if (material_at(s, px, y) == id && pz < beyond && pz >= limit)
+            if (material_at(s, px, y) == id && pz < beyond && pz >= limit) {
                 near = fminf(near, pz);
+                tilt(s, px, y, t);
+                sum[0] += lrint((double)t[0] * 1024);
+                sum[1] += lrint((double)t[1] * 1024);
+                count++;
+            }
         }
-        if (z >= limit)
+        if (z >= limit) {
+            slopes[0] = (float)sum[0] / (1024.0f * (float)count);
+            slopes[1] = (float)sum[1] / (1024.0f * (float)count);
             return 0.5f * (far + near);
+        }
         beyond = limit;
     }
 }
@@ -198,7 +224,12 @@ static uint32_t hash(uint32_t a)
 
 static int turn_of(const twin_scene *s, int x, int y, int seed)
 {
-    static const int order[4][4] = {{0, 8, 2, 10}, {12, 4, 14, 6}, {3, 11, 1, 9}, {15, 7, 13, 5}};
+    static const int order[4][4] = {
+        {0,  8,  2,  10},
+        {12, 4,  14, 6 },
+        {3,  11, 1,  9 },
+        {15, 7,  13, 5 }
+    };
     return (order[y & 3][x & 3] * 16 + s->frame.number * 97 + (int)(hash((uint32_t)seed) >> 24)) & 255;
 }
 
@@ -208,21 +239,28 @@ void twin_burley(const twin_scene *s, int x, int y, int n, bool turn, int seed, 
     uint32_t id = s->stencil[at(s, x, y)];
     const twin_material *m = &s->materials[id];
     const float *d = m->scatter_distance_mm;
-    float most = fmaxf(d[0], fmaxf(d[1], d[2])), middle = middle_depth(s, x, y), inv_d = 1e3f / most;
+    float t[2], most = fmaxf(d[0], fmaxf(d[1], d[2])), middle = group_of(s, x, y, t), inv_d = 1e3f / most;
+    float slope2 = fmaf(t[0], t[0], t[1] * t[1]);
+    float less = slope2 > 0 ? (1.0f / sqrtf(1.0f + slope2) - 1.0f) / slope2 : 0;
+    float xx = less * t[0] * t[0], xy = less * t[0] * t[1], yy = less * t[1] * t[1];
     float kx = c->focal[0] / (middle * inv_d), ky = c->focal[1] / (middle * inv_d);
     int which = turn ? turn_of(s, x, y, seed) : 0;
     float co = (float)cos(2 * pi * which / 256), si = (float)sin(2 * pi * which / 256);
-    double z = s->depth[at(s, x, y)], scale = z / middle, own = area_of(s, x, y), sum[3] = {0}, weights[3] = {0};
+    double z = s->depth[at(s, x, y)], scale = z / middle, own = area_of(s, x, y), sum[3] = {0},
+           weights[3] = {0};
     float *tx = rl_malloc((size_t)n * 12), *ty = tx + n, *tw = ty + n;
     rl_burley_taps((size_t)n, tx, ty, tw);
     for (int i = 0; i < n; i++) {
         float u = fmaf(tx[i], co, -(ty[i] * si)), v = fmaf(tx[i], si, ty[i] * co);
+        float x_disk = u;
+        u = fmaf(v, xy, fmaf(u, xx, u));
+        v = fmaf(x_disk, xy, fmaf(v, yy, v));
         int px = x + (int)nearbyint((double)u * kx), py = y + (int)nearbyint((double)v * ky);
         bool same = material_at(s, px, py) == id;
         if (!same && m->border == 0)
             continue;
         double dz = same ? (s->depth[at(s, px, py)] - z) / (most * 1e-3) : 0;
-        double r = sqrt(((double)tx[i] * tx[i] + (double)ty[i] * ty[i]) * scale * scale + dz * dz);
+        double r = sqrt(((double)u * u + (double)v * v) * scale * scale + dz * dz);
         double area = same ? area_of(s, px, py) / own : 1;
         for (int k = 0; k < 3; k++) {
             double w = rl_burley_profile(r, d[k] / most) * 8 * pi * (d[k] / most) * tw[i] * area;

@@ -1,4 +1,5 @@
-/* The scattering passes in plain C and double precision, one pixel at a time: what the kernels are checked against. */
+/* The scattering passes in plain C and double precision, one pixel at a time: what the kernels are checked
+ * against. */
 #ifndef RL_TESTS_SSS_TWIN_H
 #define RL_TESTS_SSS_TWIN_H
 
@@ -21,7 +22,8 @@ typedef struct twin_scene {
     const twin_material *materials;
     const float *diffuse, *lit, *albedo, *normal, *depth;
     const uint32_t *stencil;
-    bool area; /* weighting: area */
+    bool area;    /* weighting: area */
+    bool tangent; /* orientation: tangent */
 } twin_scene;
 
 /* lit + filtered · exit · F_out at pixel (x, y), from the filtered radiance. */
@@ -30,7 +32,8 @@ void twin_resolve(const twin_scene *s, int x, int y, const double filtered[3], d
 /* The dense sum. */
 void twin_reference(const twin_scene *s, int x, int y, double filtered[3]);
 
-/* n taps (n > 0), the vector's common scale and the phase's turn as the kernel has them; `turn`: rotation on. */
+/* n taps (n > 0), the vector's common scale and the phase's turn as the kernel has them; `turn`: rotation on.
+ */
 void twin_burley(const twin_scene *s, int x, int y, int n, bool turn, int seed, double filtered[3]);
 
 #endif

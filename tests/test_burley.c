@@ -16,7 +16,8 @@
 static double xi_at(int i)
 {
     double t = (double)i / STEPS; /* 0…1 */
-    return t < 0.5 ? pow(10, -9 + 2 * t * (9 + log10(0.5))) : 1 - pow(10, -9 + 2 * (1 - t) * (9 + log10(0.5)));
+    return t < 0.5 ? pow(10, -9 + 2 * t * (9 + log10(0.5)))
+                   : 1 - pow(10, -9 + 2 * (1 - t) * (9 + log10(0.5)));
 }
 
 /* Share beyond t, 1 - P, in long double: the scale on which xi near 1 is exact. */

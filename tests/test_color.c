@@ -173,6 +173,62 @@ static void test_spaces_match(void **state)
     }
 }
 
+/* No transform that the shipped config can be asked for needs a table. */
+static void test_config_is_whole(void **state)
+{
+    rl_arena arena = {0};
+    rl_ocio_names spaces, displays, views;
+    (void)state;
+    assert_int_equal(rl_ocio_validate(config, NULL), RL_OK);
+    assert_int_equal(rl_ocio_list_names(config, RL_OCIO_SPACES, NULL, &arena, &spaces, NULL), RL_OK);
+    assert_int_equal(rl_ocio_list_names(config, RL_OCIO_DISPLAYS, NULL, &arena, &displays, NULL), RL_OK);
+    assert_int_equal(spaces.n, 9);
+    assert_int_equal(displays.n, 2);
+    for (size_t i = 0; i < spaces.n; i++) {
+        for (size_t k = 0; k < spaces.n; k++)
+            assert_false(make_pass(config, &(rl_ocio_request){.from = spaces.names[i], .to = spaces.names[k]},
+                                   &arena, NULL)
+                             .baked);
+        for (size_t d = 0; d < displays.n; d++) {
+            assert_int_equal(
+                rl_ocio_list_names(config, RL_OCIO_VIEWS, displays.names[d], &arena, &views, NULL), RL_OK);
+            assert_int_equal(views.n, 3);
+            for (size_t v = 0; v < views.n; v++) {
+                rl_ocio_request request = {
+                    .from = spaces.names[i], .display = displays.names[d], .view = views.names[v]};
+                assert_false(make_pass(config, &request, &arena, NULL).baked);
+            }
+        }
+    }
+    rl_arena_free(&arena);
+}
+
+/* Every allocation fails once: an error or, where it was not needed, the same program; no crash, no leak. */
+static void test_out_of_memory(void **state)
+{
+    static const rl_ocio_request request = {.from = "ACEScg", .display = "sRGB", .view = "ACES"};
+    rl_arena kept = {0};
+    rl_color_pass want = make_pass(config, &request, &kept, NULL);
+    int failures = 0;
+    (void)state;
+    for (unsigned long n = 1; n < 300; n++) {
+        rl_arena arena = {0};
+        rl_color_pass pass;
+        rl_alloc_fail_at(n, 0);
+        rl_code code = rl_color_pass_new(config, &request, false, RL_NOWHERE, &arena, NULL, &pass, NULL);
+        rl_alloc_fail_at(0, 0);
+        if (code == RL_OK)
+            assert_string_equal(pass.pass->kernel_text, want.pass->kernel_text);
+        else
+            assert_int_equal(code, RL_E_MEMORY);
+        failures += code != RL_OK;
+        rl_arena_free(&arena);
+    }
+    print_message("# %d allocations\n", failures);
+    assert_true(failures > 20);
+    rl_arena_free(&kept);
+}
+
 static void test_no_change_no_pass(void **state)
 {
     static const rl_ocio_request raw = {.from = "lin_rec709", .display = "sRGB", .view = "Raw"};
@@ -237,56 +293,76 @@ typedef struct op_case {
 /* clang-format off: version 14 crashes on this table */
 static const op_case ops[] = {
     {"!<MatrixTransform> {matrix: [0.5, 0.2, 0, 0, 0, 1, 0, 0, 0.1, 0, 0.9, 0, 0, 0, 0, 1], offset: [0.1, 0, "
-     "-1, 0]}",                                                                                      -1,   20,  1e-6},
+     "-1, 0]}",                                                                                      -1,    20,  1e-6},
     {"!<MatrixTransform> {matrix: [0.5, 0.2, 0, 0, 0, 1, 0, 0, 0.1, 0, 0.9, 0, 0, 0, 0, 1], offset: [0.1, 0, "
      "-1, 0], "
-     "direction: inverse}",                                                                          -1,   20,  1e-6},
-    {"!<RangeTransform> {min_in_value: 0.1, max_in_value: 4, min_out_value: 0, max_out_value: 1}",        -1,   20,
-     1e-6                                                                                                                },
-    {"!<LogTransform> {base: 10}",                                                                        -0.1, 20,  1e-6},
-    {"!<LogTransform> {base: 2, direction: inverse}",                                                     -4,   8,   1e-6},
+     "direction: inverse}",                                                                          -1,    20,  1e-6},
+    {"!<RangeTransform> {min_in_value: 0.1, max_in_value: 4, min_out_value: 0, max_out_value: 1}",        -1,    20,
+     1e-6                                                                                                                 },
+    {"!<LogTransform> {base: 10}",                                                                        -0.1,  20,  1e-6},
+    {"!<LogTransform> {base: 2, direction: inverse}",                                                     -4,    8,   1e-6},
     {"!<LogAffineTransform> {base: 10, log_side_slope: 0.3, log_side_offset: 0.6, lin_side_slope: [1.1, 1, "
      "0.9], "
-     "lin_side_offset: 0.01}",                                                                       -0.1, 20,  3e-6},
+     "lin_side_offset: 0.01}",                                                                       -0.1,  20,  3e-6},
     {"!<LogCameraTransform> {base: 10, log_side_slope: 0.25, log_side_offset: 0.4, lin_side_slope: 5, "
-     "lin_side_offset: 0.05, lin_side_break: 0.01}",                                                 -0.1, 20,  1e-6},
+     "lin_side_offset: 0.05, lin_side_break: 0.01}",                                                 -0.1,  20,  1e-6},
     {"!<LogCameraTransform> {base: 10, log_side_slope: 0.25, log_side_offset: 0.4, lin_side_slope: 5, "
-     "lin_side_offset: 0.05, lin_side_break: 0.01, linear_slope: 4, direction: inverse}",            -0.1, 1.1, 3e-6},
-    {"!<ExponentTransform> {value: 2.2}",                                                                 -0.1, 4,   1e-6},
-    {"!<ExponentTransform> {value: [2.2, 1, 1.8, 1], style: mirror, direction: inverse}",                 -1,   4,   1e-6},
-    {"!<ExponentTransform> {value: [0.4, 2, 1.5, 1], style: pass_thru}",                                  -1,   4,   1e-6},
-    {"!<ExponentWithLinearTransform> {gamma: 2.4, offset: 0.055}",                                        -0.1, 2,   1e-6},
-    {"!<ExponentWithLinearTransform> {gamma: 2.4, offset: 0.055, style: mirror, direction: inverse}",     -1,   4,
-     1e-6                                                                                                                },
+     "lin_side_offset: 0.05, lin_side_break: 0.01, linear_slope: 4, direction: inverse}",            -0.1,  1.1, 3e-6},
+    {"!<ExponentTransform> {value: 2.2}",                                                                 -0.1,  4,   1e-6},
+    {"!<ExponentTransform> {value: [2.2, 1, 1.8, 1], style: mirror, direction: inverse}",                 -1,    4,   1e-6},
+    {"!<ExponentTransform> {value: [0.4, 2, 1.5, 1], style: pass_thru}",                                  -1,    4,   1e-6},
+    {"!<ExponentWithLinearTransform> {gamma: 2.4, offset: 0.055}",                                        -0.1,  2,   1e-6},
+    {"!<ExponentWithLinearTransform> {gamma: 2.4, offset: 0.055, style: mirror, direction: inverse}",     -1,    4,
+     1e-6                                                                                                                 },
     {"!<CDLTransform> {slope: [1.1, 1, 0.9], offset: [0.01, -0.02, 0], power: [1.2, 1, 0.8], saturation: "
-     "0.8}",                                                                                         -0.1, 4,   3e-6},
+     "0.8}",                                                                                         -0.1,  4,   3e-6},
     {"!<CDLTransform> {slope: [1.1, 1, 0.9], offset: [0.01, -0.02, 0], power: [1.2, 1, 0.8], sat: 1.2, "
      "style: asc, "
-     "direction: inverse}",                                                                          -0.1, 1.5, 3e-6},
+     "direction: inverse}",                                                                          -0.1,  1.5, 3e-6},
     {"!<ExposureContrastTransform> {style: linear, exposure: 0.5, contrast: 1.3, gamma: 1, pivot: 0.18}",
-     -0.1,                                                                                                      4,   1e-5},
+     -0.1,                                                                                                       4,   1e-5},
     {"!<ExposureContrastTransform> {style: video, exposure: -1, contrast: 0.7, gamma: 1.1, pivot: 0.18, "
-     "direction: inverse}",                                                                          -0.1, 1.5, 1e-5},
+     "direction: inverse}",                                                                          -0.1,  1.5, 1e-5},
     {"!<ExposureContrastTransform> {style: log, exposure: 1, contrast: 0.7, gamma: 1.1, pivot: 0.18}",    -0.1,
-     1.5,                                                                                                            1e-6},
-    {"!<GradingRGBCurveTransform> " GRADE ", master: " POINTS "}",                                        -10,  10,  3e-6},
-    {"!<GradingRGBCurveTransform> " GRADE ", direction: inverse}",                                        -5,   5,   3e-5},
-    {"!<GradingRGBCurveTransform> {style: linear, master: " POINTS "}",                                   -0.1, 20,  3e-5},
-    {"!<FixedFunctionTransform> {style: ACES_Glow03}",                                                    -0.1, 4,   1e-6},
-    {"!<FixedFunctionTransform> {style: ACES_Glow10, direction: inverse}",                                -0.1, 4,   1e-6},
-    {"!<FixedFunctionTransform> {style: ACES_RedMod03}",                                                  -0.1, 4,   1e-5},
-    {"!<FixedFunctionTransform> {style: ACES_RedMod03, direction: inverse}",                              0,    4,   1e-5},
-    {"!<FixedFunctionTransform> {style: ACES_RedMod10, direction: inverse}",                              0,    4,   1e-5},
-    {"!<FixedFunctionTransform> {style: ACES_DarkToDim10, direction: inverse}",                           -0.1, 4,   1e-6},
-    {"!<FixedFunctionTransform> {style: REC2100_Surround, params: [0.78]}",                               -0.1, 4,   1e-6},
-    {"!<BuiltinTransform> {style: ACES-LMT - ACES 1.3 Reference Gamut Compression}",                      -0.1, 20,  3e-5},
-    {"!<BuiltinTransform> {style: ACES-LMT - ACES 1.3 Reference Gamut Compression, direction: inverse}",  0,    2,
-     3e-3                                                                                                                }, /* has a pole */
-    {"!<BuiltinTransform> {style: CURVE - LINEAR_to_ST-2084}",                                            -0.1, 100, 1e-5},
-    {"!<BuiltinTransform> {style: ADX10_to_ACES2065-1}",                                                  0,    1,   1e-4},
-    {"!<FileTransform> {src: curve.spi1d}",                                                               -0.1, 2,   1e-6},
-    {"!<FileTransform> {src: cube.cube, interpolation: tetrahedral}",                                     -0.1, 1.2, 1e-6},
-    {"!<FileTransform> {src: cube.cube, interpolation: linear}",                                          -0.1, 1.2, 1e-6},
+     1.5,                                                                                                             1e-6},
+    {"!<GradingRGBCurveTransform> " GRADE ", master: " POINTS "}",                                        -10,   10,  3e-6},
+    {"!<GradingRGBCurveTransform> " GRADE ", direction: inverse}",                                        -5,    5,   3e-5},
+    {"!<GradingRGBCurveTransform> {style: linear, master: " POINTS "}",                                   -0.1,  20,  3e-5},
+    {"!<GradingPrimaryTransform> {style: log, brightness: {rgb: [10, 0, -5], master: 2}, contrast: {rgb: "
+     "[1.1, 1, 0.9], master: 1.1}, "
+     "gamma: {rgb: [1.2, 1, 0.9], master: 1}, saturation: 0.9, pivot: {contrast: -0.1, black: 0.02, white: "
+     "0.95}, clamp: {black: 0, white: 1}}",                                                          -0.1,  1.2, 3e-6},
+    {"!<GradingPrimaryTransform> {style: linear, offset: {rgb: [0.1, 0, -0.1], master: 0}, exposure: {rgb: "
+     "[0.2, 0, -0.5], master: 0.5}, "
+     "contrast: {rgb: [1.1, 1.2, 0.9], master: 1.1}, saturation: 1.1, pivot: {contrast: 0.2}}",      -0.1,  4,   1e-5},
+    {"!<GradingPrimaryTransform> {style: video, lift: {rgb: [0.01, 0, 0.02], master: 0}, gain: {rgb: [1.1, "
+     "1, 0.9], master: 1}, "
+     "gamma: {rgb: [1.1, 1.2, 0.9], master: 1.05}, saturation: 0.8, direction: inverse}",            -0.1,  1.2, 1e-5},
+    {"!<FixedFunctionTransform> {style: ACES_Glow03}",                                                    -0.1,  4,   1e-6},
+    {"!<FixedFunctionTransform> {style: ACES_Glow10, direction: inverse}",                                -0.1,  4,   1e-6},
+    {"!<FixedFunctionTransform> {style: ACES_RedMod03}",                                                  -0.1,  4,   1e-5},
+    {"!<FixedFunctionTransform> {style: ACES_RedMod03, direction: inverse}",                              0,     4,   1e-5},
+    {"!<FixedFunctionTransform> {style: ACES_RedMod10, direction: inverse}",                              0,     4,   1e-5},
+    {"!<FixedFunctionTransform> {style: ACES_DarkToDim10, direction: inverse}",                           -0.1,  4,   1e-6},
+    {"!<FixedFunctionTransform> {style: REC2100_Surround, params: [0.78]}",                               -0.1,  4,   1e-6},
+    {"!<FixedFunctionTransform> {style: RGB_TO_HSV}",                                                     -0.5,  4,   3e-6},
+    {"!<FixedFunctionTransform> {style: RGB_TO_HSV, direction: inverse}",                                 -0.5,  1.5, 1e-5},
+    {"!<FixedFunctionTransform> {style: XYZ_TO_xyY}",                                                     0,     4,   1e-6},
+    {"!<FixedFunctionTransform> {style: XYZ_TO_xyY, direction: inverse}",                                 0,     1,   1e-6},
+    {"!<FixedFunctionTransform> {style: XYZ_TO_uvY}",                                                     0,     4,   1e-6},
+    {"!<FixedFunctionTransform> {style: XYZ_TO_uvY, direction: inverse}",                                 0,     1,   3e-6},
+    {"!<FixedFunctionTransform> {style: XYZ_TO_LUV}",                                                     0,     4,   3e-6},
+    {"!<FixedFunctionTransform> {style: XYZ_TO_LUV, direction: inverse}",                                 0.001, 1,   1e-5},
+    {"!<BuiltinTransform> {style: ACES-LMT - ACES 1.3 Reference Gamut Compression}",                      -0.1,  20,  3e-5},
+    {"!<BuiltinTransform> {style: ACES-LMT - ACES 1.3 Reference Gamut Compression, direction: inverse}",  0,     2,
+     3e-3                                                                                                                 }, /* has a pole */
+    {"!<BuiltinTransform> {style: CURVE - LINEAR_to_ST-2084}",                                            -0.1,  100, 1e-5},
+    {"!<BuiltinTransform> {style: ADX10_to_ACES2065-1}",                                                  0,     1,   1e-4},
+    {"!<FileTransform> {src: curve.spi1d}",                                                               -0.1,  2,   1e-6},
+    {"!<FileTransform> {src: curve.spi1d, direction: inverse}",                                           0.01,  1,   1e-6},
+    {"!<FileTransform> {src: cube.cube, interpolation: tetrahedral, direction: inverse}",                 0,     1,   3e-6},
+    {"!<FileTransform> {src: cube.cube, interpolation: tetrahedral}",                                     -0.1,  1.2, 1e-6},
+    {"!<FileTransform> {src: cube.cube, interpolation: linear}",                                          -0.1,  1.2, 1e-6},
 };
 /* clang-format on */
 
@@ -564,6 +640,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_views_match),
         cmocka_unit_test(test_spaces_match),
+        cmocka_unit_test(test_config_is_whole),
+        cmocka_unit_test(test_out_of_memory),
         cmocka_unit_test(test_no_change_no_pass),
         cmocka_unit_test(test_exposure),
         cmocka_unit_test(test_same_bits),

@@ -247,6 +247,80 @@ static void threads_change_nothing(void **state)
     picture_free(&out);
 }
 
+static void clamping_is_counted(void **state)
+{
+    (void)state;
+    float pixels[40 * 2], back[40 * 2];
+    for (int i = 0; i < 80; i++)
+        pixels[i] = i % 10 == 0 ? 1e6f : i % 10 == 5 ? -INFINITY : 1.0f;
+    const rl_exr_source source = {"Y", RL_EXR_HALF, pixels, NULL, 2};
+    for (int c = 0; c <= RL_EXR_ZIP; c++) {
+        const rl_exr_image image = {
+            .data_window = {0, 0, 1, 39},
+            .display_window = {0, 0, 1, 39},
+            .channels = &source,
+            .n_channels = 1,
+            .compression = (rl_exr_compression)c
+        };
+        rl_error err = {0};
+        uint64_t clamped = 0;
+        rl_exr *file;
+        good(rl_exr_write(made_path("clamp.exr"), &image, pools[2], &clamped, &err), &err);
+        assert_int_equal(clamped, 16);
+        good(rl_exr_open(made_path("clamp.exr"), 0, &file, &err), &err);
+        rl_exr_plane plane = {.channel = "Y", .floats = back, .stride = 2};
+        good(rl_exr_read(file, 0, &plane, 1, NULL, NULL, &err), &err);
+        rl_exr_close(&file);
+        assert_int_equal(plane.nonfinite, 0);
+        for (int i = 0; i < 80; i++)
+            assert_true(back[i] == (i % 10 == 0 ? 65504.0f : i % 10 == 5 ? -65504.0f : 1.0f));
+    }
+}
+
+/* What does not compress is stored as it is, by every method, and the core takes it for that. */
+static void noise_is_stored_plain(void **state)
+{
+    (void)state;
+    enum { W = 50, H = 90 };
+    static uint32_t noise[W * H], back[W * H];
+    uint32_t seed = 9;
+    for (int i = 0; i < W * H; i++)
+        noise[i] = made_random(&seed);
+    const rl_exr_source source = {"id", RL_EXR_UINT, NULL, noise, W};
+    for (int c = 0; c < RL_EXR_COMPRESSIONS; c++) {
+        for (int level = 0; level <= 1; level++) {
+            const rl_exr_image image = {
+                .data_window = {0, 0, W - 1, H - 1},
+                .display_window = {0, 0, W - 1, H - 1},
+                .channels = &source,
+                .n_channels = 1,
+                .compression = (rl_exr_compression)c,
+                .level = level
+            };
+            rl_error err = {0};
+            rl_exr *file;
+            char *bytes;
+            size_t size;
+            good(rl_exr_write(made_path("noise.exr"), &image, pools[1], NULL, &err), &err);
+            good(rl_file_read(made_path("noise.exr"), &bytes, &size, &err), &err);
+            rl_free(bytes);
+            assert_in_range(size, sizeof noise, sizeof noise + 400 + 16 * H);
+            good(rl_exr_open(made_path("noise.exr"), 0, &file, &err), &err);
+            memset(back, 0, sizeof back);
+            rl_exr_plane plane = {.channel = "id", .ids = back, .stride = W};
+            good(rl_exr_read(file, 0, &plane, 1, NULL, pools[1], &err), &err);
+            rl_exr_close(&file);
+            assert_memory_equal(back, noise, sizeof noise);
+            if (c == RL_EXR_B44 ||
+                c == RL_EXR_B44A) /* the core of 3.1 takes a plain chunk for a packed one */
+                continue;
+            memset(back, 0, sizeof back);
+            made_read(made_path("noise.exr"), 0, "id", back);
+            assert_memory_equal(back, noise, sizeof noise);
+        }
+    }
+}
+
 static int setup(void **state)
 {
     (void)state;
@@ -271,6 +345,8 @@ int main(void)
         cmocka_unit_test(round_trips),
         cmocka_unit_test(core_reads_the_same),
         cmocka_unit_test(threads_change_nothing),
+        cmocka_unit_test(clamping_is_counted),
+        cmocka_unit_test(noise_is_stored_plain),
     };
     return cmocka_run_group_tests(tests, setup, teardown);
 }

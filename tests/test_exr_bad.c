@@ -8,7 +8,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
-#include <time.h>
 #include <unistd.h>
 
 #include <cmocka.h>
@@ -163,7 +162,7 @@ static void absurd_size(void **state)
     const int32_t windows[][4] = {
         {0,           0,         999999,     999999   },
         {0,           0,         1000000000, 3        },
-        {-1073741000, 0, 1073741000, 0},
+        {-1073741000, 0,         1073741000, 0        },
         {5,           5,         4,          4        },
         {INT32_MIN,   INT32_MIN, INT32_MAX,  INT32_MAX}
     };
@@ -232,11 +231,9 @@ static void cannot_be_read(void **state)
 static void mutations(void **state)
 {
     (void)state;
-    struct timespec start, now;
     uint32_t seed = 2026;
     int done = 0, failed = 0;
     const char *rounds = getenv("RELIT_FUZZ_ROUNDS");
-    clock_gettime(CLOCK_MONOTONIC, &start);
     for (int round = 0; round < (rounds ? atoi(rounds) : 4); round++) {
         for (int kind = 0; kind < RL_EXR_COMPRESSIONS + 2; kind++) {
             size_t size;
@@ -264,9 +261,6 @@ static void mutations(void **state)
             free(copy);
             rl_free(data);
         }
-        clock_gettime(CLOCK_MONOTONIC, &now);
-        if (!rounds && now.tv_sec - start.tv_sec > 20) /* a slow machine: one round is enough */
-            break;
     }
     assert_true(done >= 500 && failed > done / 3); /* the mutations bite */
 }
@@ -379,7 +373,7 @@ static int setup(void **state)
         floats[i] = (float)(i / W) + 0.1f;
         words[i] = i % 9 ? (uint32_t)(i / 50) : made_random(&seed) >> 8;
     }
-    return rl_pool_new(2, &pool, &err);
+    return rl_pool_new(2, &pool, &err) != RL_OK;
 }
 
 static int teardown(void **state)

@@ -17,14 +17,16 @@ extern const rl_pass rl_pass_sss_burley, rl_pass_sss_reference;
 
 /* The structs of the passes' parameters, in the order of their rows. */
 typedef struct burley_params {
-    int32_t taps, weighting, rotation, seed;
+    int32_t taps, orientation, weighting, rotation, seed;
 } burley_params;
 typedef struct reference_params {
-    int32_t weighting;
+    int32_t orientation, weighting;
 } reference_params;
+enum { SCREEN = 0, TANGENT = 1 };
 enum { AREA = 0, PLAIN = 1, AUTO = -1 };
 
 static cl_session *session;
+static int vector_width; /* of the vectors; 0 = as always */
 
 /* ---- scenes ---- */
 
@@ -36,12 +38,12 @@ typedef struct scene {
 } scene;
 
 static twin_material materials[6] = {
-    {0, {0, 0, 0}, 0, 0, 0, 0},
+    {0, {0, 0, 0},          0, 0, 0, 0},
     {1, {3.0f, 1.2f, 0.7f}, 0, 0, 0, 0},
-    {1, {6, 5, 3}, 1, 1, 1, 0},
-    {0, {0, 0, 0}, 0, 0, 0, 0},
-    {1, {2, 4, 8.5f}, 1, 0, 0, 1},
-    {1, {1, 1, 1}, 0, 1, 0, 0},
+    {1, {6, 5, 3},          1, 1, 1, 0},
+    {0, {0, 0, 0},          0, 0, 0, 0},
+    {1, {2, 4, 8.5f},       1, 0, 0, 1},
+    {1, {1, 1, 1},          0, 1, 0, 0},
 };
 
 static float *new_planes(size_t n)
@@ -76,7 +78,8 @@ static scene scene_make(int x, int y, int width, int height, float focal)
 
 static void scene_free(scene *s)
 {
-    float *all[] = {s->diffuse, s->lit, s->albedo, s->normal, s->depth, s->color, s->filtered, (float *)s->stencil};
+    float *all[] = {s->diffuse, s->lit,   s->albedo,   s->normal,
+                    s->depth,   s->color, s->filtered, (float *)s->stencil};
     for (size_t i = 0; i < 8; i++)
         rl_free(all[i]);
 }
@@ -91,7 +94,8 @@ static float next_random(uint32_t *state)
 #define EACH_PIXEL(s, x, y, i)                                                                               \
     for (int y = (s)->twin.frame.valid[1]; y < (s)->twin.frame.valid[3]; y++)                                \
         for (int x = (s)->twin.frame.valid[0]; x < (s)->twin.frame.valid[2]; x++)                            \
-            for (size_t i = (size_t)y * (size_t)(s)->twin.frame.columns + (size_t)x, once_ = 1; once_; once_ = 0)
+            for (size_t i = (size_t)y * (size_t)(s)->twin.frame.columns + (size_t)x, once_ = 1; once_;       \
+                 once_ = 0)
 
 /* Blobs of all materials and of nothing, a bumpy surface with jumps in depth, random light. */
 static void scene_random(scene *s, uint32_t seed)
@@ -145,9 +149,14 @@ static void scene_flat(scene *s, uint32_t id, float depth, float light)
 static void run(scene *s, const rl_pass *pass, const void *params, cl_session *on)
 {
     const cl_image images[] = {
-        {"diffuse", s->diffuse, NULL}, {"lit", s->lit, NULL},         {"albedo", s->albedo, NULL},
-        {"normal", s->normal, NULL},   {"depth", s->depth, NULL},     {"stencil", s->stencil, NULL},
-        {"color", NULL, s->color},     {"filtered", NULL, s->filtered},
+        {"diffuse",  s->diffuse, NULL       },
+        {"lit",      s->lit,     NULL       },
+        {"albedo",   s->albedo,  NULL       },
+        {"normal",   s->normal,  NULL       },
+        {"depth",    s->depth,   NULL       },
+        {"stencil",  s->stencil, NULL       },
+        {"color",    NULL,       s->color   },
+        {"filtered", NULL,       s->filtered},
     };
     cl_job job = {.pass = pass,
                   .frame = &s->twin.frame,
@@ -155,23 +164,25 @@ static void run(scene *s, const rl_pass *pass, const void *params, cl_session *o
                   .materials = materials,
                   .materials_bytes = sizeof materials,
                   .images = images,
-                  .n_images = 8};
+                  .n_images = 8,
+                  .width = vector_width};
     assert_true(cl_run(on, &job));
 }
 
 static void run_burley(scene *s, int taps, int weighting)
 {
-    const burley_params p = {taps, weighting, 1, 7};
+    const burley_params p = {taps, s->twin.tangent, weighting, 1, 7};
     run(s, &rl_pass_sss_burley, &p, session);
 }
 
 static void run_reference(scene *s, int weighting)
 {
-    const reference_params p = {weighting};
+    const reference_params p = {s->twin.tangent, weighting};
     run(s, &rl_pass_sss_reference, &p, session);
 }
 
-/* The worst difference of the image to the twin's, a pixel in `step`; relative to 1 + the value. taps 0: the dense sum. */
+/* The worst difference of the image to the twin's, a pixel in `step`; relative to 1 + the value. taps 0: the
+ * dense sum. */
 static double worst_difference(scene *s, int taps, int weighting, int step)
 {
     double worst = 0;
@@ -204,23 +215,32 @@ static double worst_difference(scene *s, int taps, int weighting, int step)
 static const struct {
     int x, y, width, height;
     float focal;
-} windows[] = {{37, 11, 150, 61, 300}, {-70, -5, 67, 33, 900}, {0, 0, 64, 4, 100}, {5, 2, 1, 1, 500}, {63, 3, 3, 45, 250}};
+} windows[] = {
+    {37,  11, 150, 61, 300},
+    {-70, -5, 67,  33, 900},
+    {0,   0,  64,  4,  100},
+    {5,   2,  1,   1,  500},
+    {63,  3,  3,   45, 250}
+};
 
 static void burley_equals_twin(void **state)
 {
     (void)state;
-    for (int weighting = AREA; weighting <= PLAIN; weighting++)
+    for (int variant = 0; variant < 4; variant++)
         for (size_t k = 0; k < sizeof windows / sizeof *windows; k++) {
             static const int taps[] = {1, 21, 55, 130};
-            scene s = scene_make(windows[k].x, windows[k].y, windows[k].width, windows[k].height, windows[k].focal);
+            scene s =
+                scene_make(windows[k].x, windows[k].y, windows[k].width, windows[k].height, windows[k].focal);
             s.twin.frame.camera.focal[1] *= 1.3f;
             s.twin.frame.camera.jitter[0] = 0.3f;
+            int weighting = variant & 1;
+            s.twin.tangent = variant >> 1;
             scene_random(&s, (uint32_t)k + 1);
             for (size_t t = 0; t < 4; t++) {
                 run_burley(&s, taps[t], weighting);
                 double worst = worst_difference(&s, taps[t], weighting, 1);
                 if (worst > 5e-5)
-                    print_message("window %zu, %d taps, weighting %d: %.2e\n", k, taps[t], weighting, worst);
+                    print_message("window %zu, %d taps, variant %d: %.2e\n", k, taps[t], variant, worst);
                 assert_true(worst <= 5e-5);
             }
             scene_free(&s);
@@ -240,15 +260,18 @@ static void burley_equals_twin_4096(void **state)
 static void reference_equals_twin(void **state)
 {
     (void)state;
-    for (int weighting = AREA; weighting <= PLAIN; weighting++)
+    for (int variant = 0; variant < 4; variant++)
         for (size_t k = 0; k < sizeof windows / sizeof *windows; k++) {
-            scene s = scene_make(windows[k].x, windows[k].y, windows[k].width, windows[k].height, windows[k].focal);
+            scene s =
+                scene_make(windows[k].x, windows[k].y, windows[k].width, windows[k].height, windows[k].focal);
             s.twin.frame.camera.focal[1] *= 1.3f;
+            int weighting = variant & 1;
+            s.twin.tangent = variant >> 1;
             scene_random(&s, (uint32_t)k + 31);
             run_reference(&s, weighting);
             double worst = worst_difference(&s, 0, weighting, 5);
             if (worst > 2e-5)
-                print_message("reference, window %zu, weighting %d: %.2e\n", k, weighting, worst);
+                print_message("reference, window %zu, variant %d: %.2e\n", k, variant, worst);
             assert_true(worst <= 1e-4);
             scene_free(&s);
         }
@@ -282,8 +305,10 @@ static double median_of(double *v, size_t n, double share)
 static void burley_tends_to_reference(void **state)
 {
     (void)state;
-    for (int weighting = AREA; weighting <= PLAIN; weighting++) {
+    for (int variant = 0; variant < 4; variant++) {
         scene s = scene_make(10, 6, 128, 72, 500);
+        int weighting = variant & 1;
+        s.twin.tangent = variant >> 1;
         double differences[3 * 18 * 10];
         size_t n = 0;
         scene_flat(&s, 1, 0.7f, 1);
@@ -300,7 +325,8 @@ static void burley_tends_to_reference(void **state)
         EACH_PIXEL(&s, x, y, i)
         {
             for (size_t c = 0; c < 3 && x % 7 == 0 && y % 7 == 0 && n < 540; c++)
-                differences[n++] = fabs(s.color[c * s.n + i] - reference[c * s.n + i]) / reference[c * s.n + i];
+                differences[n++] =
+                    fabs(s.color[c * s.n + i] - reference[c * s.n + i]) / reference[c * s.n + i];
         }
         assert_true(n > 500);
         assert_true(median_of(differences, n, 0.5) <= 0.003);
@@ -310,8 +336,8 @@ static void burley_tends_to_reference(void **state)
     }
 }
 
-/* Flat and evenly lit: the filter changes nothing, and the way out is that of the unfiltered surface. Black borders
- * (occlude) take from what is near the edge, so there it is looked at in the middle. */
+/* Flat and evenly lit: the filter changes nothing, and the way out is that of the unfiltered surface. Black
+ * borders (occlude) take from what is near the edge, so there it is looked at in the middle. */
 static void energy_is_kept(void **state)
 {
     (void)state;
@@ -361,7 +387,8 @@ static void occlusion_is_black(void **state)
     scene_free(&s);
 }
 
-/* Every material keeps its own light, whatever lies beside it: noisy borders, jumps in depth, nothing at all. */
+/* Every material keeps its own light, whatever lies beside it: noisy borders, jumps in depth, nothing at all.
+ */
 static void materials_never_leak(void **state)
 {
     (void)state;
@@ -419,8 +446,19 @@ static void detail_blends(void **state)
     (void)state;
     static const struct {
         float rho, some, many;
-    } at[] = {{0.3f, 0, 0},    {0.45f, 0, 0}, {0.475f, 0.25f, 0}, {0.5f, 0.5f, 0}, {0.55f, 1, 0}, {1.2f, 1, 0},
-              {1.8f, 1, 0},    {2.0f, 1, 0.5f}, {2.1f, 1, 0.75f},  {2.2f, 1, 1},    {40, 1, 1}};
+    } at[] = {
+        {0.3f,   0,     0    },
+        {0.45f,  0,     0    },
+        {0.475f, 0.25f, 0    },
+        {0.5f,   0.5f,  0    },
+        {0.55f,  1,     0    },
+        {1.2f,   1,     0    },
+        {1.8f,   1,     0    },
+        {2.0f,   1,     0.5f },
+        {2.1f,   1,     0.75f},
+        {2.2f,   1,     1    },
+        {40,     1,     1    }
+    };
     for (size_t k = 0; k < sizeof at / sizeof *at; k++) {
         scene s = scene_make(0, 0, 70, 40, 100);
         scene_flat(&s, 1, 16.5644f * 0.003f * 100 / at[k].rho, 1);
@@ -458,7 +496,7 @@ static void bits_do_not_depend_on_threads(void **state)
     scene_random(&s, 5);
     size_t bytes = 3 * s.n * sizeof(float);
     float *first = new_planes(3 * s.n);
-    burley_params p = {AUTO, AREA, 1, 0};
+    burley_params p = {AUTO, TANGENT, AREA, 1, 0};
     run(&s, &rl_pass_sss_burley, &p, session);
     memcpy(first, s.color, bytes);
     run(&s, &rl_pass_sss_burley, &p, one);
@@ -478,7 +516,7 @@ static void bits_do_not_depend_on_threads(void **state)
     s.twin.frame.number++;
     run(&s, &rl_pass_sss_burley, &p, session);
     assert_memory_equal(first, s.color, bytes);
-    const reference_params r = {PLAIN};
+    const reference_params r = {SCREEN, PLAIN};
     run(&s, &rl_pass_sss_reference, &r, session);
     memcpy(first, s.color, bytes);
     run(&s, &rl_pass_sss_reference, &r, one);
@@ -488,8 +526,8 @@ static void bits_do_not_depend_on_threads(void **state)
     cl_close(&one);
 }
 
-/* A pixel's bits depend on what is around it, not on where the data window starts: the same picture, cropped by
- * rows and columns that nothing within reach comes from. */
+/* A pixel's bits depend on what is around it, not on where the data window starts: the same picture, cropped
+ * by rows and columns that nothing within reach comes from. */
 static void crop_gives_the_same_bits(void **state)
 {
     (void)state;
@@ -522,6 +560,54 @@ static void crop_gives_the_same_bits(void **state)
     scene_free(&part);
 }
 
+/* Narrower vectors, for devices that want them. Of a flat surface: groups of lanes are others there. */
+static void width_does_not_matter(void **state)
+{
+    (void)state;
+    scene s = scene_make(37, 11, 150, 61, 400);
+    scene_flat(&s, 1, 0.4f, 1);
+    uint32_t seed = 4;
+    for (size_t i = 0; i < 3 * s.n; i++)
+        s.diffuse[i] = next_random(&seed);
+    float *want = new_planes(6 * s.n);
+    for (vector_width = 16; vector_width >= 4; vector_width /= 2) {
+        run_burley(&s, 21, AREA);
+        for (size_t i = 0; i < 3 * s.n; i++)
+            assert_true(vector_width == 16 || fabsf(s.color[i] - want[i]) < 1e-5f);
+        memcpy(want, s.color, 3 * s.n * sizeof *want);
+        run_reference(&s, AREA);
+        for (size_t i = 0; i < 3 * s.n; i++)
+            assert_true(vector_width == 16 || fabsf(s.color[i] - want[3 * s.n + i]) < 1e-5f);
+        memcpy(want + 3 * s.n, s.color, 3 * s.n * sizeof *want);
+    }
+    vector_width = 0;
+    rl_free(want);
+    scene_free(&s);
+}
+
+/* Patterns for a number of taps and for `auto`; memory that runs out is an error, not a crash. */
+static void tables_are_made(void **state)
+{
+    (void)state;
+    rl_arena arena = {0};
+    rl_tables tables;
+    rl_error err = {0};
+    burley_params p = {.taps = 100};
+    rl_pass_input in = {.params = &p};
+    assert_int_equal(rl_pass_sss_burley.tables(&in, &arena, &tables, &err), RL_OK);
+    assert_int_equal(tables.n, 512 + 3 * 128);
+    assert_true(fabsf(hypotf(tables.data[100], tables.data[101]) - 1) < 1e-6f);
+    p.taps = AUTO;
+    assert_int_equal(rl_pass_sss_burley.tables(&in, &arena, &tables, &err), RL_OK);
+    assert_int_equal(tables.n, 512 + 3 * 64 + 3 * 64);
+    rl_arena_free(&arena);
+    rl_alloc_fail_at(1, 1);
+    assert_int_equal(rl_pass_sss_burley.tables(&in, &arena, &tables, &err), RL_E_MEMORY);
+    rl_alloc_fail_at(0, 0);
+    assert_int_equal(err.code, RL_E_MEMORY);
+    rl_arena_free(&arena);
+}
+
 static int open_session(void **state)
 {
     (void)state;
@@ -551,6 +637,8 @@ int main(void)
         cmocka_unit_test(detail_blends),
         cmocka_unit_test(bits_do_not_depend_on_threads),
         cmocka_unit_test(crop_gives_the_same_bits),
+        cmocka_unit_test(width_does_not_matter),
+        cmocka_unit_test(tables_are_made),
     };
     return cmocka_run_group_tests(tests, open_session, close_session);
 }

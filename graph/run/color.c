@@ -54,6 +54,8 @@ static rl_code check_name(const rl_ocio *ocio, rl_ocio_list list, const char *of
     rl_arena arena = {0};
     rl_ocio_names names;
     bool found = false;
+    if (!name)
+        return rl_fail(err, RL_E_CONFIG, where, "a %s is needed", what);
     rl_code code = rl_ocio_list_names(ocio, list, of, &arena, &names, err);
     for (size_t i = 0; code == RL_OK && i < names.n; i++)
         found = found || strcmp(names.names[i], name) == 0;
@@ -169,7 +171,7 @@ static const char *describe(const rl_op *ops, size_t n, rl_arena *arena)
     rl_str_printf(&s, "%zu operations", n);
     for (size_t i = 0; i < n; i++)
         rl_str_printf(&s, "%s %s", i ? "," : ":", ops[i].name);
-    char *text = rl_arena_strdup(arena, rl_str_text(&s));
+    char *text = s.failed ? NULL : rl_arena_strdup(arena, rl_str_text(&s));
     rl_str_free(&s);
     return text;
 }
@@ -219,7 +221,10 @@ rl_code rl_color_pass_new(const rl_ocio *ocio, const rl_ocio_request *request, b
     code = generate(transform, ops, n, where, log, &text, out, err);
     if (code == RL_OK)
         code = finish_pass(&text, arena, &out->pass, err);
-    out->note = describe(ops, n, arena);
+    if (code == RL_OK)
+        out->note = describe(ops, n, arena);
+    if (code == RL_OK && !out->note)
+        code = rl_fail_memory(err, 0);
 done:
     rl_str_free(&text.body);
     rl_ocio_transform_free(&transform);

@@ -39,10 +39,11 @@ size_t rl_color_table_add(rl_color_text *t, const float *values, size_t n)
 /* "fma(b, K(…), …)" for one row; a coefficient of 0 costs nothing. */
 static void emit_row(rl_str *s, const double *m, double offset, int row)
 {
-    rl_str sum = {0}, next = {0};
+    rl_str sum = {0};
     if (offset != 0)
         rl_str_printf(&sum, "K(%s)", RL_LIT(offset));
     for (int c = 0; c < 3; c++) {
+        rl_str next = {0};
         if (m[c] == 0)
             continue;
         if (sum.length == 0 && m[c] == 1)
@@ -53,9 +54,9 @@ static void emit_row(rl_str *s, const double *m, double offset, int row)
             rl_str_printf(&next, "%c + %s", channel[c], rl_str_text(&sum));
         else
             rl_str_printf(&next, "fma(%c, K(%s), %s)", channel[c], RL_LIT(m[c]), rl_str_text(&sum));
+        s->failed = s->failed || sum.failed || next.failed;
         rl_str_free(&sum);
         sum = next;
-        next = (rl_str){0};
     }
     rl_str_printf(s, "        floatv n%c = %s;\n", channel[row], sum.length ? rl_str_text(&sum) : "K(0.0f)");
     s->failed = s->failed || sum.failed;
@@ -231,102 +232,6 @@ static bool emit_moncurve(rl_color_text *t, const rl_op *op)
     return true;
 }
 
-/* ---- grading ----------------------------------------------------------------------------------------- */
-
-static double reciprocal(double x)
-{
-    return x == 0 ? 1 : 1 / x;
-}
-
-static void emit_saturation(rl_color_text *t, double saturation)
-{
-    rl_str_add(&t->body, "        floatv luma = fma(r, K(0.2126f), fma(g, K(0.7152f), b * 0.0722f));\n");
-    for (int i = 0; i < 3; i++)
-        rl_str_printf(&t->body, "        %c = fma(%c - luma, K(%s), luma);\n", channel[i], channel[i],
-                      RL_LIT(saturation));
-}
-
-static void emit_clamp(rl_color_text *t, bool on)
-{
-    for (int i = 0; i < 3 && on; i++)
-        rl_str_printf(&t->body, "        %c = min(max(%c, 0.0f), 1.0f);\n", channel[i], channel[i]);
-}
-
-static void emit_cdl_power(rl_color_text *t, const rl_op *op)
-{
-    for (int i = 0; i < 3; i++) {
-        char c = channel[i];
-        double power = op->inverse ? reciprocal(op->u.cdl.power[i]) : op->u.cdl.power[i];
-        if (power != 1)
-            rl_str_printf(&t->body, "        %c = select(%c, rl_c_pow(%c, K(%s)), %c >= 0.0f);\n", c, c, c,
-                          RL_LIT(power), c);
-    }
-}
-
-static bool emit_cdl(rl_color_text *t, const rl_op *op)
-{
-    bool clamp = op->u.cdl.clamp;
-    if (!op->inverse) {
-        for (int i = 0; i < 3; i++)
-            rl_str_printf(&t->body, "        %c = fma(%c, K(%s), K(%s));\n", channel[i], channel[i],
-                          RL_LIT(op->u.cdl.slope[i]), RL_LIT(op->u.cdl.offset[i]));
-        emit_clamp(t, clamp);
-        emit_cdl_power(t, op);
-        emit_saturation(t, op->u.cdl.saturation);
-        emit_clamp(t, clamp);
-        return true;
-    }
-    emit_clamp(t, clamp);
-    emit_saturation(t, reciprocal(op->u.cdl.saturation));
-    emit_clamp(t, clamp);
-    emit_cdl_power(t, op);
-    for (int i = 0; i < 3; i++)
-        rl_str_printf(&t->body, "        %c = (%c - %s) * %s;\n", channel[i], channel[i],
-                      RL_LIT(op->u.cdl.offset[i]), RL_LIT(reciprocal(op->u.cdl.slope[i])));
-    emit_clamp(t, clamp);
-    return true;
-}
-
-/* OpenColorIO's least pivot and contrast, and the video style's power (1/1.83). */
-#define CONTRAST_LEAST 0.001
-#define VIDEO_POWER    0.54644808743169393
-
-static bool emit_contrast(rl_color_text *t, const rl_op *op)
-{
-    double contrast = fmax(CONTRAST_LEAST, op->u.contrast.contrast * op->u.contrast.gamma);
-    double pivot = fmax(CONTRAST_LEAST, op->u.contrast.pivot), gain = exp2(op->u.contrast.exposure);
-    if (op->u.contrast.style == 2) {
-        pivot = fmax(0, log2(pivot / 0.18) * op->u.contrast.log_step + op->u.contrast.log_grey);
-        double offset = (op->u.contrast.exposure * op->u.contrast.log_step - pivot) * contrast + pivot;
-        for (int i = 0; i < 3; i++) {
-            char c = channel[i];
-            if (op->inverse)
-                rl_str_printf(&t->body, "        %c = (%c - %s) * %s;\n", c, c, RL_LIT(offset),
-                              RL_LIT(1 / contrast));
-            else
-                rl_str_printf(&t->body, "        %c = fma(%c, K(%s), K(%s));\n", c, c, RL_LIT(contrast),
-                              RL_LIT(offset));
-        }
-        return true;
-    }
-    if (op->u.contrast.style == 1) {
-        pivot = pow(pivot, VIDEO_POWER);
-        gain = pow(gain, VIDEO_POWER);
-    }
-    if (op->inverse)
-        contrast = 1 / contrast;
-    for (int i = 0; i < 3; i++) {
-        char c = channel[i];
-        if (contrast == 1)
-            rl_str_printf(&t->body, "        %c = %c * %s;\n", c, c, RL_LIT(op->inverse ? 1 / gain : gain));
-        else
-            rl_str_printf(&t->body, "        %c = rl_c_pow(%c * %s, K(%s)) * %s;\n", c, c,
-                          RL_LIT(op->inverse ? 1 / pivot : gain / pivot), RL_LIT(contrast),
-                          RL_LIT(op->inverse ? pivot / gain : pivot));
-    }
-    return true;
-}
-
 /* ---- all of them ------------------------------------------------------------------------------------- */
 
 bool rl_color_emit(rl_color_text *t, const rl_op *op)
@@ -339,8 +244,9 @@ bool rl_color_emit(rl_color_text *t, const rl_op *op)
         [RL_OP_FIXED] = rl_color_emit_fixed,
         [RL_OP_POWER] = emit_power,
         [RL_OP_MONCURVE] = emit_moncurve,
-        [RL_OP_CDL] = emit_cdl,
-        [RL_OP_CONTRAST] = emit_contrast,
+        [RL_OP_CDL] = rl_color_emit_cdl,
+        [RL_OP_CONTRAST] = rl_color_emit_contrast,
+        [RL_OP_PRIMARY] = rl_color_emit_primary,
         [RL_OP_LUT1D] = rl_color_emit_lut1d,
         [RL_OP_LUT3D] = rl_color_emit_lut3d,
         [RL_OP_OTHER] = NULL,

@@ -20,6 +20,9 @@ extern const char *const rl_color_prelude[];
 /* Appends one operation; false when there is no generator for it (then nothing was appended). */
 bool rl_color_emit(rl_color_text *t, const rl_op *op);
 bool rl_color_emit_fixed(rl_color_text *t, const rl_op *op);
+bool rl_color_emit_cdl(rl_color_text *t, const rl_op *op);
+bool rl_color_emit_contrast(rl_color_text *t, const rl_op *op);
+bool rl_color_emit_primary(rl_color_text *t, const rl_op *op);
 bool rl_color_emit_curves(rl_color_text *t, const rl_op *op);
 bool rl_color_emit_lut1d(rl_color_text *t, const rl_op *op);
 bool rl_color_emit_lut3d(rl_color_text *t, const rl_op *op);

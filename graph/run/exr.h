@@ -44,8 +44,7 @@ typedef struct rl_exr_box {
     int x0, y0, x1, y1;
 } rl_exr_box;
 
-/* ---- reading ----------------------------------------------------------------------------------------------
- */
+/* ---- reading ---- */
 
 typedef struct rl_exr_channel {
     const char *name; /* with its layer: "albedo.R" */
@@ -85,11 +84,13 @@ int rl_exr_part_named(const rl_exr *file, const char *name);
 const rl_exr_channel *rl_exr_channel_named(const rl_exr_part *part, const char *name);
 
 /* One channel to be read, and where to. Exactly one of `floats` and `ids` is given.
- *   floats: half and float as they are, uint as the number (one that a float cannot hold is RL_E_DATA).
- *           NaN and infinities become 0 and are counted; with `replace_inf`, +Inf becomes inf_value instead
- * and is not counted (renderers write it where depth is empty). ids:    uint as it is; half and float must be
- * integral and within int32 or uint32, else RL_E_DATA names the pixel and the value; a negative id keeps its
- * 32 bits. */
+ *
+ * As floats, half and float come as they are and uint as the number (one that a float cannot hold is
+ * RL_E_DATA). NaN and infinities become 0 and are counted; with `replace_inf`, +Inf becomes inf_value instead
+ * and is not counted (renderers write it where depth is empty).
+ *
+ * As ids, uint comes as it is; half and float must be integral and within int32 or uint32, else RL_E_DATA
+ * names the pixel and the value. A negative id keeps its 32 bits. */
 typedef struct rl_exr_plane {
     const char *channel;
     float *floats;
@@ -114,8 +115,7 @@ typedef struct rl_exr_rows {
 rl_code rl_exr_read(const rl_exr *file, int part, rl_exr_plane *planes, size_t n_planes,
                     const rl_exr_rows *rows, rl_pool *pool, rl_error *err);
 
-/* ---- attributes -------------------------------------------------------------------------------------------
- */
+/* ---- attributes ---- */
 
 typedef enum rl_exr_type {
     RL_EXR_T_OTHER, /* has a printable form, no numbers */
@@ -159,8 +159,7 @@ void rl_exr_attr_at(const rl_exr *file, int part, size_t i, const char **name, c
  * the C locale, shortest; long or binary values are abbreviated. */
 void rl_exr_attr_print(const rl_exr *file, int part, size_t i, rl_str *out);
 
-/* ---- writing ----------------------------------------------------------------------------------------------
- */
+/* ---- writing ---- */
 
 /* A channel to be written. `floats` for half and float, `ids` for uint. */
 typedef struct rl_exr_source {
@@ -200,9 +199,9 @@ typedef struct rl_exr_image {
 
 /* Writes a single-part scanline file: a temporary name beside `path`, renamed when complete; after an error
  * nothing is left of it. Values beyond ±65504 (after rounding) that go into half channels are clamped and
- * counted in *clamped (may be NULL); NaN stays NaN. The file has the same bytes for every thread count (not
- * on every machine: ISA-L's output depends on the processor's vector width, its content does not). Errors:
- * RL_E_USAGE (a bad image), RL_E_IO, RL_E_MEMORY. `pool` may be NULL. */
+ * counted in *clamped (may be NULL); NaN stays NaN. The file has the same bytes for every thread count
+ * (across machines RL_EXR_LEVEL_FAST promises the same pixels only: ISA-L has other code for other
+ * processors). Errors: RL_E_USAGE (a bad image), RL_E_IO, RL_E_MEMORY. `pool` may be NULL. */
 rl_code rl_exr_write(const char *path, const rl_exr_image *image, rl_pool *pool, uint64_t *clamped,
                      rl_error *err);
 

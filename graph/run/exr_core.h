@@ -67,7 +67,7 @@ size_t rl_exr_float_to_id(const void *in, uint32_t *out, size_t n);
 
 float rl_exr_half_value(uint16_t half);
 
-/* ---- chunks (exr_chunk.c) ---- */
+/* ---- chunks (exr_inflate.c, exr_deflate.c) ---- */
 
 /* Decompresses one chunk after the other; one a worker. */
 typedef struct rl_exr_inflater rl_exr_inflater;
@@ -91,6 +91,9 @@ rl_code rl_exr_deflate(rl_exr_deflater *de, const exr_chunk_info_t *chunk, const
                        uint64_t *clamped, rl_error *err);
 
 /* ---- attributes (exr_attr.c) ---- */
+
+/* The i-th attribute as the core has it; NULL when there are not that many. */
+const exr_attribute_t *rl_exr_attr_raw(const rl_exr *file, int part, size_t i);
 
 /* Puts the image's attributes, and those that it copies, into a file that is being written. */
 rl_code rl_exr_attrs_write(exr_context_t ctx, const char *path, const rl_exr_image *image, rl_error *err);

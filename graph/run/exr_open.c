@@ -1,3 +1,4 @@
+/* Opening EXR files: the file beneath the core, its messages, the parts. */
 #include "graph/run/exr_core.h"
 
 #include <errno.h>

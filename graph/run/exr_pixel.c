@@ -1,9 +1,12 @@
+/* The loops over samples of EXR files: half floats, what is not finite, and the byte order and predictor of
+ * ZIP. */
 #include "graph/run/exr_core.h"
 
 #include <math.h>
 #include <string.h>
 
 #if defined(__x86_64__)
+#include <cpuid.h>
 #include <immintrin.h>
 #define RL_X86 1
 #define VECTOR __attribute__((target("avx2,f16c,popcnt")))
@@ -12,8 +15,7 @@
 #define HALF_MAX      65504.0f
 #define HALF_OVERFLOW 65520.0f /* from here on, rounding to nearest would give infinity */
 
-/* ---- portable ---------------------------------------------------------------------------------------------
- */
+/* ---- portable ---- */
 
 static float bits_float(uint32_t bits)
 {
@@ -158,12 +160,13 @@ size_t rl_exr_uint_to_float(const void *in, float *out, size_t n)
 }
 
 /* Integral and within int32 or uint32; NaN fails every comparison. */
-static bool id_from(double v, uint32_t *out)
+static bool id_from(float v, uint32_t *out)
 {
-    if (!(v >= -2147483648.0 && v <= 4294967295.0) || v != floor(v))
+    if (!(v >= -2147483648.0f && v < 4294967296.0f))
         return false;
-    *out = (uint32_t)(int64_t)v;
-    return true;
+    int64_t i = (int64_t)v;
+    *out = (uint32_t)i;
+    return (float)i == v;
 }
 
 size_t rl_exr_half_to_id(const void *in, uint32_t *out, size_t n)
@@ -171,7 +174,7 @@ size_t rl_exr_half_to_id(const void *in, uint32_t *out, size_t n)
     for (size_t i = 0; i < n; i++) {
         uint16_t h;
         memcpy(&h, (const char *)in + 2 * i, 2);
-        if (!id_from((double)rl_exr_half_value(h), &out[i]))
+        if (!id_from(rl_exr_half_value(h), &out[i]))
             return i;
     }
     return n;
@@ -182,14 +185,13 @@ size_t rl_exr_float_to_id(const void *in, uint32_t *out, size_t n)
     for (size_t i = 0; i < n; i++) {
         float f;
         memcpy(&f, (const char *)in + 4 * i, 4);
-        if (!id_from((double)f, &out[i]))
+        if (!id_from(f, &out[i]))
             return i;
     }
     return n;
 }
 
-/* ---- AVX2 and F16C ----------------------------------------------------------------------------------------
- */
+/* ---- AVX2 and F16C ---- */
 
 #ifdef RL_X86
 
@@ -343,7 +345,8 @@ static const rl_exr_kernels kernels_avx2 = {
 const rl_exr_kernels *rl_exr_kernels_best(void)
 {
 #ifdef RL_X86
-    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("f16c"))
+    unsigned a, b, c, d; /* F16C by hand: not every compiler's __builtin_cpu_supports knows it */
+    if (__builtin_cpu_supports("avx2") && __get_cpuid(1, &a, &b, &c, &d) && (c & bit_F16C))
         return &kernels_avx2;
 #endif
     return &rl_exr_kernels_portable;

@@ -1,3 +1,4 @@
+/* Reading pixels: wanted channels of one part into planes, chunks in parallel. */
 #include "graph/run/exr_core.h"
 
 #include <pthread.h>

@@ -1,3 +1,4 @@
+/* Writing EXR files: chunks compressed in parallel, written in order, renamed when complete. */
 #include "graph/run/exr_core.h"
 
 #include <errno.h>
@@ -67,6 +68,9 @@ static rl_code check_image(const char *path, const rl_exr_image *im, rl_error *e
     if ((unsigned)im->compression >= RL_EXR_COMPRESSIONS || im->level < 0 || im->level > 12)
         return rl_fail_file(err, RL_E_USAGE, path, "compression %d, level %d: there is none like that",
                             (int)im->compression, im->level);
+    if (im->copy_from && (im->copy_part < 0 || im->copy_part >= rl_exr_parts(im->copy_from)))
+        return rl_fail_file(err, RL_E_USAGE, path, "the file to copy attributes from has no part %d",
+                            im->copy_part);
     size_t width = (size_t)(d->x1 - d->x0) + 1;
     for (size_t c = 0; c < im->n_channels; c++) {
         const rl_exr_source *source = &im->channels[c];
@@ -147,6 +151,7 @@ static exr_result_t describe(const job *j)
 
 static rl_code start(job *j, rl_error *err)
 {
+    uint64_t bytes = 0;
     rl_code code = rl_file_temp(j->path, j->temp, sizeof j->temp, err);
     if (code) {
         j->temp[0] = 0;
@@ -172,6 +177,11 @@ static rl_code start(job *j, rl_error *err)
         rv = exr_get_chunk_count(j->ctx, 0, &j->chunks);
     if (!rv)
         rv = exr_get_scanlines_per_chunk(j->ctx, 0, &j->chunk_height);
+    if (!rv)
+        rv = exr_get_chunk_unpacked_size(j->ctx, 0, &bytes);
+    if (!rv && bytes > INT32_MAX)
+        return rl_fail_file(err, RL_E_USAGE, j->path, "%d rows of these channels exceed the format's 2 GiB",
+                            j->chunk_height);
     return rv ? rl_exr_core_fail(err, j->path, rv, "the header cannot be written") : RL_OK;
 }
 

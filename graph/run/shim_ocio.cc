@@ -79,6 +79,16 @@ extern "C" void rl_ocio_free(rl_ocio **ocio)
     destroy(ocio);
 }
 
+extern "C" rl_code rl_ocio_validate(const rl_ocio *ocio, rl_error *err)
+{
+    try {
+        ocio->config->validate();
+        return RL_OK;
+    } catch (...) {
+        return rl_shim_caught(err);
+    }
+}
+
 /* ---- names ------------------------------------------------------------------------------------------- */
 
 static int count_names(const OCIO::Config &config, rl_ocio_list what, const char *of)

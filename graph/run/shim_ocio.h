@@ -23,6 +23,10 @@ typedef struct rl_ocio_transform rl_ocio_transform; /* a processor made from one
 rl_code rl_ocio_open(const char *path, rl_ocio **out, rl_error *err);
 void rl_ocio_free(rl_ocio **ocio);
 
+/* Consistent as a whole (views name spaces that exist, and so on)? For `relit check` and tests; opening does
+ * not ask, so that a config with one broken view can still be used for the others. */
+rl_code rl_ocio_validate(const rl_ocio *ocio, rl_error *err);
+
 /* ---- names ------------------------------------------------------------------------------------------- */
 
 typedef enum rl_ocio_list {
@@ -83,6 +87,7 @@ typedef enum rl_op_kind {
     RL_OP_MONCURVE,
     RL_OP_CDL,
     RL_OP_CONTRAST,
+    RL_OP_PRIMARY,
     RL_OP_LUT1D,
     RL_OP_LUT3D,
     RL_OP_OTHER, /* exists in OpenColorIO, has no description here */
@@ -160,6 +165,11 @@ typedef struct rl_op {
             int style; /* 0 linear, 1 video, 2 logarithmic */
             double exposure, contrast, gamma, pivot, log_step, log_grey;
         } contrast;
+        struct { /* x + offset; (x - pivot)·slope + pivot; a power of (x - black)/range that keeps the sign,
+                    times range,
+                    + black; saturation; clamp */
+            double offset[3], slope[3], pivot, power[3], black, range, saturation, low, high;
+        } primary;
         struct { /* n entries of RGB; domain 0..1, or every half-float bit pattern (n = 65536) */
             size_t n;
             const float *rgb;

@@ -96,77 +96,6 @@ static void read_log_camera(const OCIO::LogCameraTransform &t, rl_op *op)
     op->u.log.has_line = t.getLinearSlopeValue(op->u.log.line_slope);
 }
 
-/* ---- curves: OpenColorIO shows the pieces that it fits to the control points only as shader uniforms ----
- */
-
-struct uniforms {
-    const int *knot_offsets = nullptr, *piece_offsets = nullptr;
-    const float *knots = nullptr, *pieces = nullptr;
-};
-
-static bool ends_with(const std::string &name, const char *tail)
-{
-    size_t n = strlen(tail);
-    return name.size() >= n && name.compare(name.size() - n, n, tail) == 0;
-}
-
-static uniforms find_uniforms(const OCIO::GpuShaderDesc &desc)
-{
-    uniforms found;
-    for (unsigned i = 0; i < desc.getNumUniforms(); i++) {
-        OCIO::GpuShaderDesc::UniformData data;
-        std::string name = desc.getUniform(i, data);
-        if (ends_with(name, "knotsOffsets"))
-            found.knot_offsets = data.m_vectorInt.m_getVector();
-        else if (ends_with(name, "coefsOffsets"))
-            found.piece_offsets = data.m_vectorInt.m_getVector();
-        else if (ends_with(name, "knots"))
-            found.knots = data.m_vectorFloat.m_getVector();
-        else if (ends_with(name, "coefs"))
-            found.pieces = data.m_vectorFloat.m_getVector();
-    }
-    return found;
-}
-
-static bool copy_spline(rl_arena *arena, const uniforms &from, int curve, rl_op_spline *out)
-{
-    int knots = from.knot_offsets[2 * curve + 1], pieces = from.piece_offsets[2 * curve + 1] / 3;
-    if (knots < 2 || pieces != knots - 1)
-        return knots == 0 || pieces == 0; /* none: the identity */
-    auto room = static_cast<float *>(rl_arena_array(arena, size_t(knots + 3 * pieces), sizeof(float)));
-    if (!room)
-        return false;
-    memcpy(room, from.knots + from.knot_offsets[2 * curve], size_t(knots) * sizeof(float));
-    memcpy(room + knots, from.pieces + from.piece_offsets[2 * curve], size_t(3 * pieces) * sizeof(float));
-    out->n = size_t(knots);
-    out->knots = room;
-    out->a = room + knots;
-    out->b = out->a + pieces;
-    out->c = out->b + pieces;
-    return true;
-}
-
-static void read_curves(rl_arena *arena, const OCIO::GradingRGBCurveTransform &t, rl_op *op)
-{
-    OCIO::TransformRcPtr copy = t.createEditableCopy();
-    auto curves = OCIO::DynamicPtrCast<OCIO::GradingRGBCurveTransform>(copy);
-    curves->makeDynamic();
-    OCIO::GpuShaderDescRcPtr desc = OCIO::GpuShaderDesc::CreateShaderDesc();
-    /* A config of its own: a shared one caches processors, and takes dynamic curves for equal. */
-    OCIO::Config::CreateRaw()
-        ->getProcessor(curves)
-        ->getOptimizedGPUProcessor(OCIO::OPTIMIZATION_NONE)
-        ->extractGpuShaderInfo(desc);
-    uniforms found = find_uniforms(*desc);
-    if (!found.knot_offsets || !found.piece_offsets || !found.knots || !found.pieces)
-        return;
-    for (int c = 0; c < 4; c++)
-        if (!copy_spline(arena, found, c, &op->u.curves.spline[c]))
-            return;
-    op->u.curves.lin = t.getStyle() == OCIO::GRADING_LIN && !t.getBypassLinToLog();
-    op->kind = RL_OP_CURVES;
-}
-
 /* ---- the rest ---------------------------------------------------------------------------------------- */
 
 static void read_fixed(const OCIO::FixedFunctionTransform &t, rl_op *op)
@@ -343,7 +272,7 @@ static bool read_op(rl_arena *arena, const OCIO::Transform &t, rl_op *op)
         read_log_camera(as<OCIO::LogCameraTransform>(t), op);
         break;
     case OCIO::TRANSFORM_TYPE_GRADING_RGB_CURVE:
-        read_curves(arena, as<OCIO::GradingRGBCurveTransform>(t), op);
+        rl_shim_curves(arena, as<OCIO::GradingRGBCurveTransform>(t), op);
         break;
     case OCIO::TRANSFORM_TYPE_FIXED_FUNCTION:
         read_fixed(as<OCIO::FixedFunctionTransform>(t), op);
@@ -359,6 +288,9 @@ static bool read_op(rl_arena *arena, const OCIO::Transform &t, rl_op *op)
         break;
     case OCIO::TRANSFORM_TYPE_EXPOSURE_CONTRAST:
         read_contrast(as<OCIO::ExposureContrastTransform>(t), op);
+        break;
+    case OCIO::TRANSFORM_TYPE_GRADING_PRIMARY:
+        rl_shim_primary(as<OCIO::GradingPrimaryTransform>(t), op);
         break;
     case OCIO::TRANSFORM_TYPE_LUT1D:
         return read_lut1d(arena, as<OCIO::Lut1DTransform>(t), op);
