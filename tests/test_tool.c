@@ -139,7 +139,7 @@ static void test_usage(void **state)
         {{"run", "p", "--crop", "0,0,10"}, "four integers"},
         {{"run", "p", "--crop", "0,0,10,0"}, "at least 1"},
         {{"run", "p", "--crop", "0,0,10,10,10"}, "four integers"},
-        {{"run", "p", "--on-missing", "ignore"}, "error|skip|hold"},
+        {{"run", "p", "--on-missing", "ignore"}, "error|skip"},
         {{"run", "p", "--set", "graph.sss.taps"}, "PATH=VALUE"},
         {{"run", "p", "--set", "=3"}, "PATH=VALUE"},
         {{"plan", "p", "--format", "png"}, "text|dot|svg|json"},
@@ -249,33 +249,58 @@ static void test_run_json_failure(void **state)
 /* ---- signals ---------------------------------------------------------------------------------------------
  */
 
-/* Starts the program on 20,000 frames and interrupts it after the first; returns what wait() says and how
- * many frames were reported. */
-static int interrupt(int number, int times, const char *pipe, const char *out, int *frames)
+/* Reads a descriptor up to and with `stop` ('\n'), or to its end; how many times `stop` came. */
+static int read_lines(int fd, int most, char *text, size_t room)
 {
-    int ends[2], status = 0;
+    int n = 0;
+    size_t used = 0;
     char c;
-    assert_int_equal(pipe2(ends, 0), 0);
+    while (n < most && read(fd, &c, 1) == 1) {
+        n += c == '\n';
+        if (used + 1 < room)
+            text[used++] = c;
+    }
+    text[used] = 0;
+    return n;
+}
+
+/* What a run of 20,000 frames left when it was interrupted after its first. */
+typedef struct interrupted {
+    int status, frames;
+    char said[4096]; /* on stderr */
+} interrupted;
+
+/* `again`: a second signal as soon as the first is answered. */
+static interrupted interrupt(int number, int again, const char *pipe, const char *out)
+{
+    interrupted r = {0};
+    int results[2], errors[2];
+    char text[4096];
+    assert_int_equal(pipe2(results, 0) | pipe2(errors, 0), 0);
     fflush(NULL);
     pid_t pid = fork();
     assert_true(pid >= 0);
     if (!pid) {
-        dup2(ends[1], 1);
-        close(ends[0]);
-        close(ends[1]);
+        dup2(results[1], 1);
+        dup2(errors[1], 2);
+        close(results[0]);
+        close(errors[0]);
         execl(program, "relit", "run", pipe, "--out", out, "--json", "--quiet", (char *)NULL);
         _exit(127);
     }
-    close(ends[1]);
-    *frames = 0;
-    while (read(ends[0], &c, 1) == 1) {
-        *frames += c == '\n';
-        if (c == '\n' && *frames <= times)
-            kill(pid, number);
-    }
-    close(ends[0]);
-    assert_int_equal(waitpid(pid, &status, 0), pid);
-    return status;
+    close(results[1]);
+    close(errors[1]);
+    r.frames = read_lines(results[0], 1, text, sizeof text);
+    kill(pid, number);
+    read_lines(errors[0], 2, r.said, sizeof r.said); /* an empty line, since a bar may stand there */
+    if (again)
+        kill(pid, again);
+    r.frames += read_lines(results[0], INT_MAX, text, sizeof text);
+    read_lines(errors[0], INT_MAX, r.said + strlen(r.said), sizeof r.said - strlen(r.said));
+    close(results[0]);
+    close(errors[0]);
+    assert_int_equal(waitpid(pid, &r.status, 0), pid);
+    return r;
 }
 
 static void test_signals(void **state)
@@ -292,11 +317,16 @@ static void test_signals(void **state)
     file_write(folder, "p.yaml", with, strlen(with));
     const int numbers[] = {SIGINT, SIGTERM};
     for (int i = 0; i < 2; i++) {
-        int frames, status = interrupt(numbers[i], 1, pipe, out, &frames);
-        assert_true(WIFSIGNALED(status));
-        assert_int_equal(WTERMSIG(status), numbers[i]);
-        assert_true(frames >= 1 && frames < 20000);
-        assert_true(folder_files(out) >= frames && folder_files(out) < 20000);
+        interrupted r = interrupt(numbers[i], 0, pipe, out);
+        assert_true(WIFSIGNALED(r.status) && WTERMSIG(r.status) == numbers[i]);
+        assert_true(r.frames >= 1 && r.frames < 20000);
+        assert_int_equal(folder_files(out), r.frames); /* what was begun is whole, and reported */
+        assert_non_null(strstr(r.said, "stopping after the frames in flight"));
+        assert_non_null(strstr(r.said, "stopped: "));
+        interrupted twice = interrupt(numbers[i], numbers[!i], pipe, out);
+        assert_true(WIFSIGNALED(twice.status) && WTERMSIG(twice.status) == numbers[!i]);
+        assert_null(strstr(twice.said, "stopped: "));
+        out = (folder_remove(out), path_in(folder, "out"));
     }
     free(file);
     free(path);
@@ -332,6 +362,30 @@ static void test_check_writes_nothing(void **state)
     expect(&r, 2); /* a file is in the way */
     tool_result_free(&r);
     free(out);
+    leave(folder, pipe);
+}
+
+/* A hole and a broken header in the middle of a sequence: an error each. */
+static void test_check_opens_every_header(void **state)
+{
+    (void)state;
+    char *pipe, *folder = enter(&pipe), *manifest = path_in(folder, "capture.yaml");
+    const char *names[] = {"capture.yaml", "monkey.0001.exr", "monkey.0002.exr", "monkey.0003.exr"};
+    for (int i = 0; i < 4; i++) {
+        size_t size;
+        char *path = path_in(capture, names[i]), *data = file_read(path, &size);
+        file_write(folder, names[i], data, i == 2 ? 100 : size);
+        free(path);
+        free(data);
+    }
+    tool_result r = RUN("check", pipe, "--capture", manifest, "--frames", "1-4");
+    expect(&r, 2);
+    assert_int_equal(lines(r.err), 2);
+    assert_non_null(strstr(r.err, "monkey.0002.exr: error: "));
+    assert_non_null(strstr(r.err, "monkey.0004.exr: error: "));
+    assert_string_equal(r.out, "");
+    tool_result_free(&r);
+    free(manifest);
     leave(folder, pipe);
 }
 
@@ -526,6 +580,36 @@ static void test_passes(void **state)
     tool_result_free(&json);
 }
 
+/* The example that `relit passes kernel` prints compiles and runs, and its range holds. */
+static void test_kernel_example(void **state)
+{
+    (void)state;
+    char *pipe, *folder = enter(&pipe), *out = path_in(folder, "out");
+    tool_result r = RUN("passes", "kernel");
+    expect(&r, 0);
+    expect_narrow(r.out);
+    char *node = strstr(r.out, "in the pipeline:\n"), *source = strstr(r.out, "in dim.cl:\n");
+    assert_true(node && source);
+    node += strlen("in the pipeline:\n");
+    file_write(folder, "dim.cl", source + strlen("in dim.cl:\n"), strlen(source + strlen("in dim.cl:\n")));
+    source[-(ptrdiff_t)strlen("example, ")] = 0;
+    char *added = text_replace(pipeline, "outputs:", node),
+         *whole = text_replace(added, "  beauty:", "outputs:\n  beauty:");
+    file_write(folder, "p.yaml", whole, strlen(whole));
+    tool_result got = RUN("run", pipe, "--capture", capture, "--frames", "1", "--out", out, "--set",
+                          "outputs.beauty.image=dim.out");
+    expect(&got, 0);
+    tool_result_free(&got);
+    got = RUN("check", pipe, "--capture", capture, "--set", "graph.dim.amount=2");
+    expect(&got, 2); /* its range holds */
+    tool_result_free(&got);
+    tool_result_free(&r);
+    free(added);
+    free(whole);
+    free(out);
+    leave(folder, pipe);
+}
+
 static void test_devices(void **state)
 {
     (void)state;
@@ -593,6 +677,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(test_run_json_failure),
         cmocka_unit_test(test_signals),
         cmocka_unit_test(test_check_writes_nothing),
+        cmocka_unit_test(test_check_opens_every_header),
         cmocka_unit_test(test_plan),
         cmocka_unit_test(test_plan_svg),
         cmocka_unit_test(test_init),
@@ -600,6 +685,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(test_inspect),
         cmocka_unit_test(test_inspect_folder),
         cmocka_unit_test(test_passes),
+        cmocka_unit_test(test_kernel_example),
         cmocka_unit_test(test_devices),
         cmocka_unit_test(test_program),
     };

@@ -1,7 +1,9 @@
-/* `relit check`: all that can be known without a pixel. */
+/* `relit check`: all that can be known without a pixel. Besides what opening a session checks, it opens every
+ * frame's files, so that a hole in a sequence is found before the night's run. */
 #include <jansson.h>
 #include <stdlib.h>
 
+#include "graph/run/session.h"
 #include "graph/tool/outdir.h"
 #include "graph/tool/tool.h"
 
@@ -47,6 +49,33 @@ static void print_json(const rl_tool *tool, const rl_session *s, rl_str *out)
     json_decref(object);
 }
 
+/* Headers of every frame: files, parts, channels, sizes, cameras. Each bad frame is reported; returns how
+ * many. */
+static size_t check_headers(const rl_tool *tool, rl_session *session)
+{
+    size_t bad = 0;
+    for (size_t i = 0; i < session->n_sequences; i++) {
+        rl_sequence *q = &session->sequences[i];
+        rl_frame frame = {0};
+        for (size_t k = 0; k < q->frames.n; k++) {
+            rl_error err = {0};
+            frame.number = q->frames.numbers[k];
+            if (rl_reader_open(q->reader, frame.number, &frame, &err)) {
+                bool skip = tool->args.run.on_missing == RL_MISSING_SKIP && err.code == RL_E_IO;
+                if (skip)
+                    rl_report(&tool->report->log, RL_WARNING, (rl_where){.file = err.file},
+                              "frame %d would be skipped: %s", frame.number, err.text);
+                else
+                    rl_report_error(tool->report, &err);
+                bad += !skip;
+            }
+            rl_frame_release(&frame);
+        }
+        rl_frame_free(&frame);
+    }
+    return bad;
+}
+
 int rl_cmd_check(rl_tool *tool, rl_error *err)
 {
     rl_session *session = NULL;
@@ -54,7 +83,7 @@ int rl_cmd_check(rl_tool *tool, rl_error *err)
     int status = RL_EXIT_WRONG;
 
     if (rl_session_open(&tool->args.run, &session, err) || rl_session_prepare(session, err) ||
-        rl_outdir_check(tool->arena, tool->args.run.out, err))
+        rl_outdir_check(tool->arena, tool->args.run.out, err) || check_headers(tool, session))
         goto done;
     if (tool->args.json)
         print_json(tool, session, &text);

@@ -10,6 +10,42 @@
 static const char *const role_names[] = {"in", "out", "history", "scratch"};
 static const char *const type_names[] = {"number", "integer", "true|false", "word", "rgb"};
 
+/* `pass: kernel` has no table: its ports and parameters are the user's. A test runs the example. */
+static const char kernel_name[] = "kernel";
+static const char kernel_help[] = "a program of your own: ports and parameters declared in the pipeline";
+static const char kernel_keys[] =
+    "\nkeys\n"
+    "  file    the .cl file, relative to the pipeline\n"
+    "  entry   the kernel function in it\n"
+    "  items   what a work-item computes: pixel (default), vector or phase\n"
+    "  ports   name: {role: read|write|history|scratch,\n"
+    "                 type: rgb|normal|vec2|scalar|id,\n"
+    "                 optional: true, of: PORT, layout: linear|phase4, help: TEXT}\n"
+    "  params  name: {type: float|int|bool|rgb|enum, value: DEFAULT,\n"
+    "                 range: [MIN, MAX], unit: TEXT, words: [A, B], help: TEXT}\n"
+    "\n"
+    "The function's arguments are a buffer a port, in the order of the ports, then\n"
+    "params_t (when there are parameters), frame_t and material_t, all constant.\n"
+    "\n"
+    "example, in the pipeline:\n"
+    "  dim:\n"
+    "    pass: kernel\n"
+    "    file: dim.cl\n"
+    "    entry: dim\n"
+    "    ports: {color: {role: read, type: rgb}, out: {role: write, type: rgb}}\n"
+    "    params: {amount: {type: float, value: 0.5, range: [0, 1], unit: ratio}}\n"
+    "    in: {color: sss.color}\n"
+    "    amount: 0.25\n"
+    "example, in dim.cl:\n"
+    "  kernel void dim(global const float *color, global float *out,\n"
+    "                  constant params_t *p, constant frame_t *f,\n"
+    "                  constant material_t *materials)\n"
+    "  {\n"
+    "      int at = rl_index(f, get_global_id(0), get_global_id(1));\n"
+    "      for (int i = 0; i < 3; i++)\n"
+    "          out[at + i * f->plane] = color[at + i * f->plane] * (1 - p->amount);\n"
+    "  }\n";
+
 /* ---- text ------------------------------------------------------------------------------------------------
  */
 
@@ -20,6 +56,7 @@ static void print_list(rl_str *out)
         width = strlen(rl_pass_at(i)->name) > width ? strlen(rl_pass_at(i)->name) : width;
     for (size_t i = 0; i < rl_pass_count(); i++)
         rl_str_printf(out, "%-*s  %s\n", (int)width, rl_pass_at(i)->name, rl_pass_at(i)->help);
+    rl_str_printf(out, "%-*s  %s\n", (int)width, kernel_name, kernel_help);
     rl_str_add(out, "\n`relit passes NAME` prints a pass's ports and parameters.\n");
 }
 
@@ -148,13 +185,15 @@ static void print_json(const rl_pass *pass, rl_str *out)
 
 static rl_code unknown(const rl_tool *tool, rl_error *err)
 {
-    const char **known = rl_arena_array(tool->arena, rl_pass_count(), sizeof *known);
+    size_t n = rl_pass_count();
+    const char **known = rl_arena_array(tool->arena, n + 1, sizeof *known);
     if (!known)
-        return rl_fail_memory(err, rl_pass_count() * sizeof *known);
-    for (size_t i = 0; i < rl_pass_count(); i++)
+        return rl_fail_memory(err, n * sizeof *known);
+    for (size_t i = 0; i < n; i++)
         known[i] = rl_pass_at(i)->name;
     rl_str text = {0};
-    rl_suggest(&text, tool->args.operand, known, rl_pass_count(), "known");
+    known[n] = kernel_name;
+    rl_suggest(&text, tool->args.operand, known, n + 1, "known");
     rl_fail_file(err, RL_E_USAGE, "relit passes", "there is no pass '%s'%s", tool->args.operand,
                  rl_str_text(&text));
     rl_str_free(&text);
@@ -165,6 +204,10 @@ int rl_cmd_passes(rl_tool *tool, rl_error *err)
 {
     const rl_pass *pass = tool->args.operand ? rl_pass_find(tool->args.operand) : NULL;
     rl_str text = {0};
+    if (tool->args.operand && !strcmp(tool->args.operand, kernel_name)) {
+        rl_str_printf(&text, "%s: %s\n%s", kernel_name, kernel_help, kernel_keys);
+        return rl_tool_print(tool, &text, err);
+    }
     if (tool->args.operand && !pass) {
         unknown(tool, err);
         return RL_EXIT_WRONG;
