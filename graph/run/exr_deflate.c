@@ -8,6 +8,8 @@
 #include "graph/base/alloc.h"
 #include "graph/run/shim_exr.h"
 
+#define LOOK_AHEAD 512 /* bytes behind the input that ISA-L may look at: more than ISAL_LOOK_AHEAD */
+
 struct rl_exr_deflater {
     exr_context_t ctx;
     const char *path;
@@ -82,8 +84,12 @@ static size_t compress_zip(rl_exr_deflater *de, size_t size)
     if (de->deflate)
         return libdeflate_zlib_compress(de->deflate, de->coded, size, de->packed, size - 1);
     struct isal_zstream *s = de->stream;
+    /* The output must depend on nothing but the chunk. init leaves the window's size and the hash tables as
+     * they are, and the search for matches looks at bytes behind the input. */
+    memset(s, 0, sizeof *s);
+    memset(de->level_buffer, 0, ISAL_DEF_LVL1_REQ);
+    memset(de->coded + size, 0, LOOK_AHEAD);
     isal_deflate_stateless_init(s);
-    s->hist_bits = 0; /* init forgets it, and what memory happens to hold would change the output */
     s->gzip_flag = IGZIP_ZLIB;
     s->level = 1;
     s->level_buf = de->level_buffer;
@@ -102,7 +108,7 @@ static rl_code ensure_zip(rl_exr_deflater *de, const exr_chunk_info_t *chunk, rl
     if (de->room >= size)
         return RL_OK;
     de->plain = rl_aligned(4 * (size_t)chunk->width); /* the first chunk is the largest: once is enough */
-    de->coded = rl_aligned(size);
+    de->coded = rl_aligned(size + LOOK_AHEAD);
     de->packed = rl_aligned(size);
     if (!de->plain || !de->coded || !de->packed)
         return rl_fail_memory(err, size);
