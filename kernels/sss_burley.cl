@@ -56,8 +56,9 @@ typedef struct group_t {
 static inline int pattern_turn(int seed, int number, int px, int py)
 {
     const int order[16] = {0, 8, 2, 10, 12, 4, 14, 6, 3, 11, 1, 9, 15, 7, 13, 5};
-    return (order[py * 4 + px] * (TURNS / 16) + (int)((uint)number * 97u & 255u) + (int)(rl_hash((uint)seed, 0, 0, 0) >> 24)) &
-           (TURNS - 1);
+    uint start = rl_hash((uint)seed, 0, 0, 0) >> 24;
+    uint turn = (uint)order[py * 4 + px] * (TURNS / 16) + (uint)number * 97u + start;
+    return (int)(turn & (TURNS - 1));
 }
 
 /* 2^x for x <= 0, relative error below 3e-6; x below -125 counts as -125: nothing beside any other weight. */
