@@ -1,9 +1,9 @@
-/* What the scattering filters share, in front of their own text: neighbours in RL_PHASE4, vectors of one material,
- * and the way out of the surface. Distances are in metres unless a name ends in _u: those are in units of the
- * largest scattering distance of the material. */
+/* What the scattering filters share, in front of their own text: neighbours in RL_PHASE4, vectors of one
+ * material, and the way out of the surface. Distances are in metres unless a name ends in _u: those are in
+ * units of the largest scattering distance of the material. */
 
-#define WEIGHTING_AREA  0
-#define WEIGHTING_PLAIN 1
+#define WEIGHTING_AREA      0
+#define WEIGHTING_PLAIN     1
 #define ORIENTATION_SCREEN  0
 #define ORIENTATION_TANGENT 1
 
@@ -16,9 +16,10 @@ enum { EXIT_SSS = 0, EXIT_LIGHTING = 1 };
 
 /* The ports of the passes that are built on this, in their order. */
 #define SCATTER_PORTS                                                                                        \
-    global const float *diffuse, global const float *lit, global const float *albedo, global const float *normal, \
-        global const float *depth, global const uint *stencil, global float *area, global float *filtered,   \
-        global float *color, constant params_t *p, constant frame_t *f, constant material_t *materials
+    global const float *diffuse, global const float *lit, global const float *albedo,                        \
+        global const float *normal, global const float *depth, global const uint *stencil,                   \
+        global float *area, global float *filtered, global float *color, constant params_t *p,               \
+        constant frame_t *f, constant material_t *materials
 
 /* What the filters read: planes in RL_PHASE4. */
 typedef struct inputs_t {
@@ -27,7 +28,7 @@ typedef struct inputs_t {
     constant frame_t *f;
 } inputs_t;
 
-/* ---- one vector of a sub-image ----------------------------------------------------------------------------- */
+/* ---- one vector of a sub-image ------------------------------------------------------------------------ */
 
 /* RL_W pixels of one sub-image: (4*(sx + lane) + px, 4*sy + py). */
 typedef struct vector_t {
@@ -47,8 +48,8 @@ static inline vector_t scatter_vector(constant frame_t *f)
     return v;
 }
 
-/* Index of the vector (dx, dy) pixels away. It lies in the sub-image of another phase, but its lanes are neighbours
- * all the same. What lies beyond the image is led to a margin, where the stencil is 0. */
+/* Index of the vector (dx, dy) pixels away. It lies in the sub-image of another phase, but its lanes are
+ * neighbours all the same. What lies beyond the image is led to a margin, where the stencil is 0. */
 static inline int scatter_at(constant frame_t *f, const vector_t *v, int dx, int dy)
 {
     int x = v->px + dx, y = v->py + dy, row = v->sy + (y >> 2);
@@ -57,8 +58,8 @@ static inline int scatter_at(constant frame_t *f, const vector_t *v, int dx, int
     return row >= 0 && row < (f->rows >> 2) ? at : 0;
 }
 
-/* Fetches the lines of a vector that is loaded soon. Taps are far apart, which the hardware cannot foresee: on CPUs this
- * takes a sixth off the time. Elsewhere nothing happens. */
+/* Fetches the lines of a vector that is loaded soon. Taps are far apart, which the hardware cannot foresee:
+ * on CPUs this takes a sixth off the time. Elsewhere nothing happens. */
 #if defined(__x86_64__) || defined(__aarch64__)
 #define SCATTER_FETCH(p) __builtin_prefetch((const void *)(ulong)(p))
 #else
@@ -71,7 +72,7 @@ static inline void scatter_fetch(global const float *p)
     SCATTER_FETCH(p + RL_W - 1);
 }
 
-/* ---- masks and lanes --------------------------------------------------------------------------------------- */
+/* ---- masks and lanes ---------------------------------------------------------------------------------- */
 
 static inline floatv scatter_keep(floatv v, intv mask)
 {
@@ -113,8 +114,8 @@ static inline int scatter_any(intv mask)
     return (c.x | c.y) != 0;
 }
 
-/* The largest positive float of the lanes in the mask, 0 when there is none: as bits, positive floats sort like
- * integers. */
+/* The largest positive float of the lanes in the mask, 0 when there is none: as bits, positive floats sort
+ * like integers. */
 static inline float scatter_farthest(floatv v, intv mask)
 {
     return as_float(max(0, scatter_max_int(rl_as_intv(v) & mask)));
@@ -126,17 +127,18 @@ static inline float scatter_nearest(floatv v, intv mask)
     return as_float(big - max(0, scatter_max_int((big - rl_as_intv(v)) & mask)));
 }
 
-/* ---- the surface that a pixel sees ------------------------------------------------------------------------- */
+/* ---- the surface that a pixel sees -------------------------------------------------------------------- */
 
-/* Slope of the depth along one axis, metres a pixel: the flatter of the two differences to neighbours of the same
- * material, so that a silhouette does not count as a slope; 0 when there are none. */
+/* Slope of the depth along one axis, metres a pixel: the flatter of the two differences to neighbours of the
+ * same material, so that a silhouette does not count as a slope; 0 when there are none. */
 static inline floatv scatter_slope(global const float *depth, global const uint *stencil, constant frame_t *f,
                                    const vector_t *v, int dx, int dy)
 {
     int i = scatter_at(f, v, dx, dy), j = scatter_at(f, v, -dx, -dy);
     intv id = rl_as_intv(rl_vload(0, stencil + v->at));
     floatv z = rl_vload(0, depth + v->at), a = rl_vload(0, depth + i) - z, b = z - rl_vload(0, depth + j);
-    intv has_a = rl_as_intv(rl_vload(0, stencil + i)) == id, has_b = rl_as_intv(rl_vload(0, stencil + j)) == id;
+    intv has_a = rl_as_intv(rl_vload(0, stencil + i)) == id,
+         has_b = rl_as_intv(rl_vload(0, stencil + j)) == id;
     intv take_a = has_a & (~has_b | (fabs(a) <= fabs(b)));
     return rl_select(scatter_keep(b, has_b), a, take_a);
 }
@@ -146,7 +148,8 @@ static inline floatv scatter_slope(global const float *depth, global const uint 
 static inline floatv scatter_tilt(const inputs_t *in, const vector_t *v, floatv z, int dx, int dy)
 {
     float focal = dx ? in->f->camera.focal[0] : in->f->camera.focal[1];
-    return clamp(scatter_slope(in->depth, in->stencil, in->f, v, dx, dy) * (focal / z), -MOST_TILT, MOST_TILT);
+    return clamp(scatter_slope(in->depth, in->stencil, in->f, v, dx, dy) * (focal / z), -MOST_TILT,
+                 MOST_TILT);
 }
 
 /* Area of the surface that a pixel sees, m² on the plane z = -1 times f_x·f_y: |dP/dx × dP/dy| of
@@ -166,7 +169,7 @@ static inline void scatter_area(global const float *depth, global const uint *st
     rl_vstore(z * sqrt(zx * zx + zy * zy + n * n), 0, area + v.at);
 }
 
-/* ---- the way out ------------------------------------------------------------------------------------------- */
+/* ---- the way out -------------------------------------------------------------------------------------- */
 
 /* Burley's transmission 1 - (1 - |c|)^5 / 2, without the retro-reflection term. */
 static inline floatv scatter_disney(floatv c)
@@ -181,7 +184,8 @@ static inline floatv scatter_n_dot_v(constant frame_t *f, global const float *no
     constant camera_t *c = &f->camera;
     constant float *m = c->to_world;
     int at = rl_index(f, x, y);
-    floatv nx = rl_load(normal, at), ny = rl_load(normal + f->plane, at), nz = rl_load(normal + 2 * f->plane, at);
+    floatv nx = rl_load(normal, at), ny = rl_load(normal + f->plane, at),
+           nz = rl_load(normal + 2 * f->plane, at);
     floatv rx = rl_ray_x(f, c, rl_to_floatv(RL_LANES + x));
     float ry = rl_ray_y(f, c, (float)y);
     floatv dot = nx * (m[0] * rx + (m[1] * ry - m[2])) + ny * (m[4] * rx + (m[5] * ry - m[6])) +
@@ -189,10 +193,12 @@ static inline floatv scatter_n_dot_v(constant frame_t *f, global const float *no
     return -dot * rsqrt(rx * rx + (ry * ry + 1.0f));
 }
 
-/* color = lit + filtered · exit(albedo) · F_out, for RL_W pixels of a row; `filtered` and `stencil` are RL_PHASE4. */
-static inline void scatter_resolve(global const float *filtered, global const float *lit, global const float *albedo,
-                                   global const float *normal, global const uint *stencil, global float *color,
-                                   constant frame_t *f, constant material_t *materials)
+/* color = lit + filtered · exit(albedo) · F_out, for RL_W pixels of a row; `filtered` and `stencil` are
+ * RL_PHASE4. */
+static inline void scatter_resolve(global const float *filtered, global const float *lit,
+                                   global const float *albedo, global const float *normal,
+                                   global const uint *stencil, global float *color, constant frame_t *f,
+                                   constant material_t *materials)
 {
     int x = RL_W * (int)get_global_id(0), y = get_global_id(1);
     int at = rl_index(f, x, y);
@@ -207,7 +213,8 @@ static inline void scatter_resolve(global const float *filtered, global const fl
             continue;
         scatters |= mine;
         pre_post |= mat->profile_texturing == TEXTURING_PRE_POST ? mine : 0;
-        disney |= mat->shading_diffuse == DIFFUSE_DISNEY && mat->shading_exit_transmission == EXIT_SSS ? mine : 0;
+        disney |=
+            mat->shading_diffuse == DIFFUSE_DISNEY && mat->shading_exit_transmission == EXIT_SSS ? mine : 0;
     }
     floatv out = 1.0f;
     if (scatter_any(disney))

@@ -1,18 +1,25 @@
-/* Importance-sampled subsurface scattering with Burley's profile (Golubev 2018), in the form that suits wide vectors:
- * the pattern is turned a phase at a time, so that a tap is one offset for a whole vector and every load contiguous;
- * one scale serves the lanes of a vector that are about equally far away, and each lane's weights use its own.
+/* Importance-sampled subsurface scattering with Burley's profile (Golubev 2018), in the form that suits wide
+ * vectors: the pattern is turned a phase at a time, so that a tap is one offset for a whole vector and every
+ * load contiguous; one scale serves the lanes of a vector that are about equally far away, and each lane's
+ * weights use its own.
  *
- * Tap i stands for the light of 1/n of the profile at its exact place, and reads the pixel that this place is in. So the
- * sum over taps tends to the sum over pixels of the profile's integral over the pixel's square. */
+ * Tap i stands for the light of 1/n of the profile at its exact place, and reads the pixel that this place is
+ * in. So the sum over taps tends to the sum over pixels of the profile's integral over the pixel's square:
+ * sss_reference.
+ *
+ * How wrong: the common scale is off by up to 11 % for a lane, so its filter ends between 0.89 and 1.11
+ * r_max, where 0.25 % of the light is (its weights are exact). Laid into the tangent plane (`orientation:
+ * tangent`) taps follow the mean plane of their lanes; a lane that is turned away from the others gets none
+ * from the ends of its own disk. */
 
-#define TAP_BLOCK 64        /* taps that are turned and rounded at a time */
-#define AHEAD     8         /* taps from fetching to loading */
-#define TURNS     256       /* directions in the table */
-#define NEAR      0.8f      /* lanes share a scale from here to 1 times the farthest */
-#define MIN_WEIGHT 1e-12f      /* less in all than a sample 80 d away has: the pixel keeps its own light */
+#define TAP_BLOCK  64     /* taps that are turned and rounded at a time */
+#define AHEAD      8      /* taps from fetching to loading */
+#define TURNS      256    /* directions in the table */
+#define NEAR       0.8f   /* lanes share a scale from here to 1 times the farthest */
+#define MIN_WEIGHT 1e-12f /* less in all than a sample 80 d away has: the pixel keeps its own light */
 
-/* Level of detail, by the filter's radius in pixels: from which radius on there is a filter, and the taps of the small
- * and of the large one. passes/sss_burley.c makes the patterns. */
+/* Level of detail, by the filter's radius in pixels: from which radius on there is a filter, and the taps of
+ * the small and of the large one. passes/sss_burley.c makes the patterns. */
 #define LOD_SOME  0.5f
 #define LOD_MANY  2.0f
 #define TAPS_SOME 21
@@ -33,22 +40,25 @@ enum { ROTATION_NONE = 0, ROTATION_PHASE = 1 };
 /* What is constant for some lanes of a vector. */
 typedef struct group_t {
     vector_t v;
-    floatv z;          /* depth */
-    floatv scale2;     /* (depth / middle depth)²: from the taps' radii to the lane's true ones, squared */
-    float inv_d;       /* 1 / the largest scattering distance, 1/m */
-    float k[2];        /* pixels a d at the middle depth */
-    float fall[3];     /* exponents of 2 a unit of r_u: -d_max / (3 d ln 2) */
-    float turn[2];     /* cos, sin of the pattern's turn */
-    float squeeze[3];  /* xx, xy, yy: from the disk to the screen's plane, less the identity */
+    floatv z;         /* depth */
+    floatv scale2;    /* (depth / middle depth)²: from the taps' radii to the lane's true ones, squared */
+    float inv_d;      /* 1 / the largest scattering distance, 1/m */
+    float k[2];       /* pixels a d at the middle depth */
+    float fall[3];    /* exponents of 2 a unit of r_u: -d_max / (3 d ln 2) */
+    float turn[2];    /* cos, sin of the pattern's turn */
+    float squeeze[3]; /* xx, xy, yy: from the disk to the screen's plane, less the identity */
     int material;
-    intv keep;         /* all bits: samples that are none count as black */
+    intv keep; /* all bits: samples that are none count as black */
 } group_t;
 
-/* The direction of a phase in a frame: the sixteen phases are a sixteenth of a turn apart, frames a golden section. */
+/* The direction of a phase in a frame: the sixteen phases are a sixteenth of a turn apart, frames a golden
+ * section. */
 static inline int pattern_turn(int seed, int number, int px, int py)
 {
     const int order[16] = {0, 8, 2, 10, 12, 4, 14, 6, 3, 11, 1, 9, 15, 7, 13, 5};
-    return (order[py * 4 + px] * (TURNS / 16) + number * 97 + (int)(rl_hash((uint)seed, 0, 0, 0) >> 24)) & (TURNS - 1);
+    uint start = rl_hash((uint)seed, 0, 0, 0) >> 24;
+    uint turn = (uint)order[py * 4 + px] * (TURNS / 16) + (uint)number * 97u + start;
+    return (int)(turn & (TURNS - 1));
 }
 
 /* 2^x for x <= 0, relative error below 3e-6; x below -125 counts as -125: nothing beside any other weight. */
@@ -65,10 +75,10 @@ static inline floatv weight_exp2(floatv x)
     return rl_as_floatv(rl_as_intv(p) + (rl_as_intv(r) << 23)); /* magic's own low bits are 0 */
 }
 
-/* Taps first…first+n-1, n <= TAP_BLOCK: index of the vector, radius² in units of d, weight. There are RL_W more
- * indices behind the last, for looking ahead. */
-static inline void place_taps(const inputs_t *in, const group_t *g, constant float *taps, int stride, int first, int n,
-                              int *at, float *r2, float *weight)
+/* Taps first…first+n-1, n <= TAP_BLOCK: index of the vector, radius² in units of d, weight. There are RL_W
+ * more indices behind the last, for looking ahead. */
+static inline void place_taps(const inputs_t *in, const group_t *g, constant float *taps, int stride,
+                              int first, int n, int *at, float *r2, float *weight)
 {
     const float magic = 12582912.0f;
     constant frame_t *f = in->f;
@@ -76,7 +86,8 @@ static inline void place_taps(const inputs_t *in, const group_t *g, constant flo
     int i = 0;
     for (; i < n; i += RL_W) {
         floatv x = rl_vload(0, taps + first + i), y = rl_vload(0, taps + stride + first + i);
-        floatv u = fma(x, (floatv)g->turn[0], -(y * g->turn[1])), v = fma(x, (floatv)g->turn[1], y * g->turn[0]);
+        floatv u = fma(x, (floatv)g->turn[0], -(y * g->turn[1])),
+               v = fma(x, (floatv)g->turn[1], y * g->turn[0]);
 #if P_orientation == ORIENTATION_TANGENT
         floatv flat = u;
         u = fma(v, (floatv)g->squeeze[1], fma(u, (floatv)g->squeeze[0], u));
@@ -164,8 +175,9 @@ static inline int sum_lanes(intv v)
     return sum;
 }
 
-/* Lays the disk into the mean tangent plane of the lanes `now`. Seen along the view axis it is squeezed by the cosine
- * in the direction t of the slope: I + (cos - 1) t t'. Tilts are rounded to 1/1024, so that their sum is exact. */
+/* Lays the disk into the mean tangent plane of the lanes `now`. Seen along the view axis it is squeezed by
+ * the cosine in the direction t of the slope: I + (cos - 1) t t'. Tilts are rounded to 1/1024, so that their
+ * sum is exact. */
 static inline void lay_disk(const inputs_t *in, group_t *g, intv now)
 {
     const float magic = 12582912.0f;
@@ -183,8 +195,8 @@ static inline void lay_disk(const inputs_t *in, group_t *g, intv now)
 #endif
 
 /* The lanes `now` of the group, with the pattern that their size on screen asks for. */
-static inline void filter_group(const inputs_t *in, const group_t *g, constant params_t *p, constant float *taps,
-                                intv now, floatv out[3])
+static inline void filter_group(const inputs_t *in, const group_t *g, constant params_t *p,
+                                constant float *taps, intv now, floatv out[3])
 {
     floatv sum[3] = {out[0], out[1], out[2]};
     if (p->taps > 0) {

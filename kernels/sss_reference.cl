@@ -1,7 +1,7 @@
-/* The dense sum that the filters approximate: every pixel of the material within r_max of the pixel, weighted with
- * the light that its square sends here, R(sqrt(r² + dz²)). Within two pixels the weight is integrated over the
- * square (Gauss-Legendre), beyond it is taken at its middle; the pixel's own is P(pixel/sqrt(pi)), that of the disk
- * of its area. The largest d of the material sets r_max for the three channels. */
+/* The dense sum that the filters approximate: every pixel of the material within r_max of the pixel, weighted
+ * with the light that its square sends here, R(sqrt(r² + dz²)). Within two pixels the weight is integrated
+ * over the square (Gauss-Legendre), beyond it is taken at its middle; the pixel's own is P(pixel/sqrt(pi)),
+ * that of the disk of its area. The largest d of the material sets r_max for the three channels. */
 
 typedef struct sums_t {
     floatv w[3], c[3]; /* weights; weights times light */
@@ -29,13 +29,16 @@ static inline void burley(floatv r2, const float *d, floatv w[3])
     }
 }
 
-/* Mean of R over the square of the pixel (dx, dy) away, n² nodes. Six nodes for the eight neighbours and three for
- * the sixteen around them leave 1e-5. */
+/* Mean of R over the square of the pixel (dx, dy) away, n² nodes. Six nodes for the eight neighbours and
+ * three for the sixteen around them leave 1e-5. */
 static inline void burley_square(const centre_t *at, int dx, int dy, floatv dz2, int n, floatv w[3])
 {
-    const float x6[6] = {-0.466234757f, -0.330604693f, -0.119309593f, 0.119309593f, 0.330604693f, 0.466234757f};
-    const float w6[6] = {0.0856622462f, 0.180380787f, 0.233956967f, 0.233956967f, 0.180380787f, 0.0856622462f};
-    const float x3[3] = {-0.387298335f, 0.0f, 0.387298335f}, w3[3] = {0.277777778f, 0.444444444f, 0.277777778f};
+    const float x6[6] = {-0.466234757f, -0.330604693f, -0.119309593f,
+                         0.119309593f,  0.330604693f,  0.466234757f};
+    const float w6[6] = {0.0856622462f, 0.180380787f, 0.233956967f,
+                         0.233956967f,  0.180380787f, 0.0856622462f};
+    const float x3[3] = {-0.387298335f, 0.0f, 0.387298335f},
+                w3[3] = {0.277777778f, 0.444444444f, 0.277777778f};
     floatv z2 = at->z * at->z;
     w[0] = w[1] = w[2] = 0.0f;
     for (int j = 0; j < n; j++)
@@ -72,7 +75,8 @@ static inline void gather(const inputs_t *in, const centre_t *at, int dx, int dy
 #endif
     int i = scatter_at(in->f, &at->v, dx, dy);
     intv near = mine & (disk2 <= at->reach * at->reach);
-    intv same = near & (rl_as_intv(rl_vload(0, in->stencil + i)) == at->material), counts = near & (same | at->keep);
+    intv same = near & (rl_as_intv(rl_vload(0, in->stencil + i)) == at->material),
+         counts = near & (same | at->keep);
     if (!scatter_any(counts))
         return;
     floatv dz = scatter_keep(rl_vload(0, in->depth + i) - at->z, same), w[3];
@@ -96,8 +100,8 @@ static inline void gather(const inputs_t *in, const centre_t *at, int dx, int dy
     }
 }
 
-static inline void filter_material(const inputs_t *in, const vector_t *v, int material, constant material_t *mat,
-                                   intv mine, floatv out[3])
+static inline void filter_material(const inputs_t *in, const vector_t *v, int material,
+                                   constant material_t *mat, intv mine, floatv out[3])
 {
     centre_t at;
     at.v = *v;

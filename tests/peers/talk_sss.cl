@@ -1,7 +1,8 @@
-/* The per-pixel kernel of Golubev's talk (SIGGRAPH 2018), written down straightforwardly: a work-item a pixel, taps
- * from a table, turned by a random angle, gathered from planes, bilateral weights R(sqrt(r² + dz²))/p(r). The same
- * filter as sss_burley with `orientation: screen`, `weighting: plain`, `border: renormalize`; what that is measured against.
- * Built by tests/bench_sss.c with WIDTH, HEIGHT, TAPS, FOCAL_X, FOCAL_Y and the ray's constants defined. */
+/* The per-pixel kernel of Golubev's talk (SIGGRAPH 2018), written down straightforwardly: a work-item a
+ * pixel, taps from a table, turned by a random angle, gathered from planes, bilateral weights R(sqrt(r² +
+ * dz²))/p(r). The same filter as sss_burley with `orientation: screen`, `weighting: plain`, `border:
+ * renormalize`; what that is measured against. Built by tests/bench_sss.c with WIDTH, HEIGHT, TAPS, FOCAL_X,
+ * FOCAL_Y and the ray's constants defined. */
 
 typedef struct peer_material {
     int has_profile;
@@ -31,7 +32,8 @@ kernel void talk_sss(global const float *diffuse, global const float *lit, globa
     float3 sum = 0.0f, total = 0.0f, s = (float3)(1.0f / m->d[0], 1.0f / m->d[1], 1.0f / m->d[2]);
     for (int i = 0; i < TAPS; i++) {
         float u = taps[3 * i] * most, v = taps[3 * i + 1] * most;
-        int px = x + (int)rint((u * co - v * si) * FOCAL_X / z), py = y + (int)rint((u * si + v * co) * FOCAL_Y / z);
+        int px = x + (int)rint((u * co - v * si) * FOCAL_X / z),
+            py = y + (int)rint((u * si + v * co) * FOCAL_Y / z);
         if (px < 0 || py < 0 || px >= WIDTH || py >= HEIGHT)
             continue;
         int there = py * WIDTH + px;
