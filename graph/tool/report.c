@@ -223,6 +223,7 @@ void rl_report_run_end(rl_reporter *r, const rl_run_summary *s, bool stopped)
                   "%" PRIu64 " samples of the capture were NaN or infinite; they became 0", s->nonfinite);
     if (s->clamped)
         rl_report(&r->log, RL_NOTE, RL_NOWHERE,
-                  "%" PRIu64 " samples of the capture were outside of their range and were clamped",
+                  "%" PRIu64
+                  " samples were outside of the range of their layer or of their file and were clamped",
                   s->clamped);
 }
