@@ -97,6 +97,7 @@ typedef struct rl_frame_result {
     size_t n_files;        /* written */
     const char *const *files;
     uint64_t nonfinite, clamped;   /* samples of the capture that were NaN or infinite (now 0), or clamped */
+    uint64_t clipped; /* samples of the outputs beyond what their files can hold */
     double load_s, run_s, write_s; /* seconds in each stage */
     size_t done, total;            /* frames of the whole run, this one included */
 } rl_frame_result;
@@ -110,7 +111,7 @@ typedef struct rl_run_hooks {
 
 typedef struct rl_run_summary {
     size_t frames, failed;
-    uint64_t nonfinite, clamped;
+    uint64_t nonfinite, clamped, clipped;
     size_t peak_bytes; /* the most that relit had allocated, device buffers included */
 } rl_run_summary;
 

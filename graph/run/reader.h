@@ -31,7 +31,8 @@ typedef struct rl_frame {
     int main_file, main_part;  /* that hold depth: cameras and metadata come from there */
     uint32_t *ids;             /* the stencil as the file has it, width*height; NULL unless asked for */
     size_t ids_room;
-    uint64_t nonfinite, clamped;
+    uint64_t nonfinite, clamped; /* of the capture */
+    uint64_t clipped;            /* of the outputs */
     rl_error error;            /* of any stage; the first one counts */
     double load_s, run_s, write_s;
 } rl_frame;

@@ -93,10 +93,8 @@ static rl_code write_output(rl_session *s, rl_sequence *q, rl_frame *f, size_t o
             restore_ids(f, w, i, &wr.images[i]);
         wr.n = i + 1;
     }
-    uint64_t clamped = 0;
     if (!code)
-        code = rl_sink_write(path, &s->outputs[output], wr.images, wr.n, frame, s->pool, &clamped, err);
-    f->clamped += clamped;
+        code = rl_sink_write(path, &s->outputs[output], wr.images, wr.n, frame, s->pool, &f->clipped, err);
     for (size_t i = 0; i < wr.n; i++) {
         rl_code unmapped = wr.memory[i] ? rl_memory_unmap(wr.memory[i], code ? NULL : err) : RL_OK;
         code = code ? code : unmapped;
@@ -159,6 +157,7 @@ static void batch_load(void *ctx, size_t item, int slot)
     f->number = b->q->frames.numbers[item];
     f->error = (rl_error){0};
     f->run_s = f->write_s = 0;
+    f->clipped = 0;
     b->skipped[slot] = false;
     if (!rl_reader_open(b->q->reader, f->number, f, &f->error) && !fit_buffers(b->q, f, &before, &f->error))
         rl_reader_pixels(b->q->reader, f, b->s->pool, &f->error);
@@ -213,6 +212,7 @@ static void batch_write(void *ctx, size_t item, int slot)
     b->summary->failed += f->error.code != RL_OK;
     b->summary->nonfinite += f->nonfinite;
     b->summary->clamped += f->clamped;
+    b->summary->clipped += f->clipped;
     rl_frame_result result = {.capture = b->q->manifest->name,
                               .frame = f->number,
                               .error = &f->error,
@@ -220,6 +220,7 @@ static void batch_write(void *ctx, size_t item, int slot)
                               .files = files,
                               .nonfinite = f->nonfinite,
                               .clamped = f->clamped,
+                              .clipped = f->clipped,
                               .load_s = f->load_s,
                               .run_s = f->run_s,
                               .write_s = f->write_s,

@@ -170,6 +170,7 @@ static rl_code write_exr(const char *path, const rl_sink_output *o, const rl_sin
     for (size_t i = 0; i < n; i++)
         add_image(list, &images[i], type, r);
     add_coverage(list, images, n, coverage, r->width, type);
+    uint64_t beyond = 0;
     rl_exr_attribute attrs[8];
     int compression = o->spec->compression ? rl_exr_compression_named(o->spec->compression) : RL_EXR_ZIP;
     rl_exr_image image = {.data_window = r->window,
@@ -192,7 +193,8 @@ static rl_code write_exr(const char *path, const rl_sink_output *o, const rl_sin
         memcpy(image.screen_center, part->screen_center, sizeof image.screen_center);
     }
     rl_code code = list->failed ? rl_fail_file(err, RL_E_MEMORY, path, "too many channels for one file")
-                                : rl_exr_write(path, &image, pool, clamped, err);
+                                : rl_exr_write(path, &image, pool, &beyond, err);
+    *clamped += beyond;
     rl_arena_free(&list->names);
     rl_free(list);
     return code;

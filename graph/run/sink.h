@@ -39,7 +39,7 @@ typedef struct rl_sink_output {
     rl_primaries primaries; /* known: chromaticities are written */
 } rl_sink_output;
 
-/* `path` is the final name; the file is whole or not there. *clamped counts samples beyond the range of the file's type.
+/* `path` is the final name; the file is whole or not there. *clamped grows by the samples beyond the range of the file's type.
  * RL_E_DATA when the crop misses the data window. */
 rl_code rl_sink_write(const char *path, const rl_sink_output *output, const rl_sink_image *images, size_t n_images,
                       const rl_sink_frame *frame, rl_pool *pool, uint64_t *clamped, rl_error *err);
