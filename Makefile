@@ -105,7 +105,7 @@ $(BUILD)/tests/help.a: $(HELP_O)
 	@rm -f $@
 	@ar rcs $@ $^
 
-$(BUILD)/tests/%: $(BUILD)/tests/%.o $(BUILD)/tests/help.a $(BUILD)/tool.a $(BUILD)/librelit.a
+$(BUILD)/tests/%: $(BUILD)/tests/%.o $(BUILD)/tests/sanitizers.o $(BUILD)/tests/help.a $(BUILD)/tool.a $(BUILD)/librelit.a
 	$(CC) $(LDFLAGS) -o $@ $^ $(LIBS) -lcmocka
 
 test-build: all $(TESTS)

@@ -63,30 +63,39 @@ static bool emit_gamut(rl_color_text *t, const rl_op *op)
     return true;
 }
 
-/* Colour spaces that are no matrix, forward and inverse. r, g, b hold X, Y, Z or H, S, V. White of Luv is
- * D65. */
-static bool emit_space(rl_color_text *t, const rl_op *op)
+/* ---- colour spaces that are no matrix: r, g, b hold X, Y, Z or H, S, V; the white of Luv is D65
+ * -------------- */
+
+static const char to_xyy[] = "        floatv d = rl_c_inverse(r + g + b), y = g;\n"
+                             "        r *= d, g *= d, b = y;\n";
+
+static const char from_xyy[] = "        floatv d = b * rl_c_inverse(g), z = (1.0f - r - g) * d;\n"
+                               "        r *= d, g = b, b = z;\n";
+
+static const char to_uvy[] = "        floatv d = rl_c_inverse(r + 15.0f * g + 3.0f * b), y = g;\n"
+                             "        r *= 4.0f * d, g *= 9.0f * d, b = y;\n";
+
+static const char from_uvy[] = "        floatv d = 0.75f * b * rl_c_inverse(g);\n"
+                               "        floatv z = (4.0f - r - 6.66666667f * g) * d;\n"
+                               "        r *= 3.0f * d, g = b, b = z;\n";
+
+static const char to_luv[] = "        floatv d = rl_c_inverse(r + 15.0f * g + 3.0f * b);\n"
+                             "        floatv u = 4.0f * r * d, v = 9.0f * g * d;\n"
+                             "        floatv root = 1.16f * rl_c_pow(g, K(0.333333333f)) - 0.16f;\n"
+                             "        r = select(root, 9.03296296f * g, g <= 0.00885645168f);\n"
+                             "        g = 13.0f * r * (u - 0.19783001f);\n"
+                             "        b = 13.0f * r * (v - 0.46831999f);\n";
+
+static const char from_luv[] = "        floatv d = 0.0769230769f * rl_c_inverse(r);\n"
+                               "        floatv u = g * d + 0.19783001f, v = b * d + 0.46831999f;\n"
+                               "        floatv e = (r + 0.16f) * 0.862068966f;\n"
+                               "        floatv y = select(e * e * e, 0.110705646f * r, r <= 0.08f);\n"
+                               "        floatv s = 0.25f * y * rl_c_inverse(v);\n"
+                               "        r = 9.0f * u * s, g = y, b = (12.0f - 3.0f * u - 20.0f * v) * s;\n";
+
+static bool emit_space(rl_color_text *t, const char *forward, const char *backward, bool inverse)
 {
-    static const char *const texts[][2] = {
-        [RL_FIXED_HSV] = {"        rl_c_to_hsv(&r, &g, &b);\n",                          "        rl_c_from_hsv(&r, &g, &b);\n"                   },
-        [RL_FIXED_XYY] = {"        floatv d = rl_c_inverse(r + g + b), y = g;\n"
-                          "        r *= d, g *= d, b = y;\n",  "        floatv d = b * rl_c_inverse(g), z = (1.0f - r - g) * d;\n"
-                          "        r *= d, g = b, b = z;\n"},
-        [RL_FIXED_UVY] =
-            {"        floatv d = rl_c_inverse(r + 15.0f * g + 3.0f * b), y = g;\n"
-             "        r *= 4.0f * d, g *= 9.0f * d, b = y;\n", "        floatv d = 0.75f * b * rl_c_inverse(g), z = (4.0f - r - 6.66666667f * g) * d;\n"
-             "        r *= 3.0f * d, g = b, b = z;\n"     },
-        [RL_FIXED_LUV] = {"        floatv d = rl_c_inverse(r + 15.0f * g + 3.0f * b), u = 4.0f * r * d, v = "
-                          "9.0f * g * d;\n"
-                          "        floatv root = 1.16f * rl_c_pow(g, K(0.333333333f)) - 0.16f;\n"
-                          "        r = select(root, 9.03296296f * g, g <= 0.00885645168f);\n"
-                          "        g = 13.0f * r * (u - 0.19783001f), b = 13.0f * r * (v - 0.46831999f);\n",                                                              "        floatv d = 0.0769230769f * rl_c_inverse(r), u = g * d + 0.19783001f;\n"
-                          "        floatv v = b * d + 0.46831999f, e = (r + 0.16f) * 0.862068966f;\n"
-                          "        floatv y = select(e * e * e, 0.110705646f * r, r <= 0.08f);\n"
-                          "        floatv s = 0.25f * y * rl_c_inverse(v);\n"
-                          "        r = 9.0f * u * s, g = y, b = (12.0f - 3.0f * u - 20.0f * v) * s;\n"                                       },
-    };
-    rl_str_add(&t->body, texts[op->u.fixed.style][op->inverse]);
+    rl_str_add(&t->body, inverse ? backward : forward);
     return true;
 }
 
@@ -110,10 +119,14 @@ bool rl_color_emit_fixed(rl_color_text *t, const rl_op *op)
     case RL_FIXED_GAMUT_COMP_13:
         return emit_gamut(t, op);
     case RL_FIXED_HSV:
+        return emit_space(t, "        rl_c_to_hsv(&r, &g, &b);\n", "        rl_c_from_hsv(&r, &g, &b);\n",
+                          op->inverse);
     case RL_FIXED_XYY:
+        return emit_space(t, to_xyy, from_xyy, op->inverse);
     case RL_FIXED_UVY:
+        return emit_space(t, to_uvy, from_uvy, op->inverse);
     case RL_FIXED_LUV:
-        return emit_space(t, op);
+        return emit_space(t, to_luv, from_luv, op->inverse);
     }
     return false;
 }

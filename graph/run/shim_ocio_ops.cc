@@ -104,17 +104,17 @@ static void read_fixed(const OCIO::FixedFunctionTransform &t, rl_op *op)
         OCIO::FixedFunctionStyle theirs;
         rl_op_fixed ours;
     } styles[] = {
-        {OCIO::FIXED_FUNCTION_ACES_RED_MOD_03,     RL_FIXED_RED_MOD_03      },
-        {OCIO::FIXED_FUNCTION_ACES_RED_MOD_10,     RL_FIXED_RED_MOD_10      },
-        {OCIO::FIXED_FUNCTION_ACES_GLOW_03,        RL_FIXED_GLOW_03         },
-        {OCIO::FIXED_FUNCTION_ACES_GLOW_10,        RL_FIXED_GLOW_10         },
-        {OCIO::FIXED_FUNCTION_ACES_DARK_TO_DIM_10, RL_FIXED_DARK_TO_DIM_10  },
-        {OCIO::FIXED_FUNCTION_ACES_GAMUT_COMP_13,  RL_FIXED_GAMUT_COMP_13   },
-        {OCIO::FIXED_FUNCTION_REC2100_SURROUND,    RL_FIXED_REC2100_SURROUND},
-        {OCIO::FIXED_FUNCTION_RGB_TO_HSV,          RL_FIXED_HSV             },
-        {OCIO::FIXED_FUNCTION_XYZ_TO_xyY,          RL_FIXED_XYY             },
-        {OCIO::FIXED_FUNCTION_XYZ_TO_uvY,          RL_FIXED_UVY             },
-        {OCIO::FIXED_FUNCTION_XYZ_TO_LUV,          RL_FIXED_LUV             },
+        {OCIO::FIXED_FUNCTION_ACES_RED_MOD_03, RL_FIXED_RED_MOD_03},
+        {OCIO::FIXED_FUNCTION_ACES_RED_MOD_10, RL_FIXED_RED_MOD_10},
+        {OCIO::FIXED_FUNCTION_ACES_GLOW_03, RL_FIXED_GLOW_03},
+        {OCIO::FIXED_FUNCTION_ACES_GLOW_10, RL_FIXED_GLOW_10},
+        {OCIO::FIXED_FUNCTION_ACES_DARK_TO_DIM_10, RL_FIXED_DARK_TO_DIM_10},
+        {OCIO::FIXED_FUNCTION_ACES_GAMUT_COMP_13, RL_FIXED_GAMUT_COMP_13},
+        {OCIO::FIXED_FUNCTION_REC2100_SURROUND, RL_FIXED_REC2100_SURROUND},
+        {OCIO::FIXED_FUNCTION_RGB_TO_HSV, RL_FIXED_HSV},
+        {OCIO::FIXED_FUNCTION_XYZ_TO_xyY, RL_FIXED_XYY},
+        {OCIO::FIXED_FUNCTION_XYZ_TO_uvY, RL_FIXED_UVY},
+        {OCIO::FIXED_FUNCTION_XYZ_TO_LUV, RL_FIXED_LUV},
     };
     if (t.getNumParams() > sizeof op->u.fixed.params / sizeof(double))
         return;
@@ -131,12 +131,10 @@ static bool read_negative(OCIO::NegativeStyle style, rl_op_negative *out)
     static const struct {
         OCIO::NegativeStyle theirs;
         rl_op_negative ours;
-    } styles[] = {
-        {OCIO::NEGATIVE_CLAMP,     RL_NEGATIVE_CLAMP },
-        {OCIO::NEGATIVE_MIRROR,    RL_NEGATIVE_MIRROR},
-        {OCIO::NEGATIVE_PASS_THRU, RL_NEGATIVE_PASS  },
-        {OCIO::NEGATIVE_LINEAR,    RL_NEGATIVE_LINEAR}
-    };
+    } styles[] = {{OCIO::NEGATIVE_CLAMP, RL_NEGATIVE_CLAMP},
+                  {OCIO::NEGATIVE_MIRROR, RL_NEGATIVE_MIRROR},
+                  {OCIO::NEGATIVE_PASS_THRU, RL_NEGATIVE_PASS},
+                  {OCIO::NEGATIVE_LINEAR, RL_NEGATIVE_LINEAR}};
     for (const auto &known : styles)
         if (known.theirs == style) {
             *out = known.ours;
@@ -226,8 +224,8 @@ template <typename T> static const T &as(const OCIO::Transform &t)
     return dynamic_cast<const T &>(t);
 }
 
-/* False when memory is out. What cannot be described stays RL_OP_OTHER. */
-static bool read_op(rl_arena *arena, const OCIO::Transform &t, rl_op *op)
+/* For people. */
+static const char *name_of(OCIO::TransformType type)
 {
     static const char *const names[] = {"allocation",
                                         "built-in",
@@ -251,9 +249,14 @@ static bool read_op(rl_arena *arena, const OCIO::Transform &t, rl_op *op)
                                         "3D table",
                                         "matrix",
                                         "range"};
+    return size_t(type) < sizeof names / sizeof *names ? names[type] : "unknown";
+}
+
+/* False when memory is out. What cannot be described stays RL_OP_OTHER. */
+static bool read_op(rl_arena *arena, const OCIO::Transform &t, rl_op *op)
+{
     op->kind = RL_OP_OTHER;
-    size_t type = size_t(t.getTransformType());
-    op->name = type < sizeof names / sizeof *names ? names[type] : "unknown";
+    op->name = name_of(t.getTransformType());
     op->inverse = t.getDirection() == OCIO::TRANSFORM_DIR_INVERSE;
     switch (t.getTransformType()) {
     case OCIO::TRANSFORM_TYPE_MATRIX:
