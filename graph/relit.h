@@ -123,7 +123,9 @@ rl_code rl_session_run(rl_session *session, const rl_run_hooks *hooks, rl_run_su
 /* ---- processing memory, reading back ---------------------------------------------------------------------
  */
 
-/* A channel as a file would have it, named as in the manifest's `layers`. One of floats and ids. Row 0 is the
+/* For frames that never were a file the capture says `files: memory` (tests/example.c).
+ *
+ * A channel as a file would have it, named as in the manifest's `layers`. One of floats and ids. Row 0 is the
  * top row; `stride` counts elements from row to row. The caller keeps the memory. */
 typedef struct rl_channel_data {
     const char *name;

@@ -220,6 +220,10 @@ static void print_light(const rl_light_spec *l, double unit, rl_str *s)
 
 static void print_files(const rl_manifest *m, rl_str *s)
 {
+    if (m->n_patterns == 0) {
+        rl_str_add(s, "files: memory\n");
+        return;
+    }
     if (m->n_patterns == 1) {
         rl_str_add(s, "files: ");
         print_text(s, m->patterns[0].path);

@@ -249,6 +249,10 @@ static rl_code open_files(rl_reader *r, int file_number, rl_frame *f, rl_error *
 rl_code rl_reader_open(rl_reader *r, int file_number, rl_frame *f, rl_error *err)
 {
     rl_frame_release(f);
+    if (r->setup.manifest->n_patterns == 0)
+        return rl_fail(err, RL_E_CONFIG, r->setup.manifest->where,
+                       "capture '%s' has 'files: memory': its frames must come through the C API",
+                       r->setup.manifest->name);
     rl_code code = open_files(r, file_number, f, err);
     const rl_layer *depth = r->bindings[r->depth].layer;
     f->main_file = depth->pattern;
