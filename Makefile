@@ -108,6 +108,9 @@ $(BUILD)/tests/help.a: $(HELP_O)
 $(BUILD)/tests/%: $(BUILD)/tests/%.o $(BUILD)/tests/sanitizers.o $(BUILD)/tests/help.a $(BUILD)/tool.a $(BUILD)/librelit.a
 	$(CC) $(LDFLAGS) -o $@ $^ $(LIBS) -lcmocka
 
+# It loads the module; so does whatever writes PNG files.
+$(BUILD)/tests/test_image_file: | $(BUILD)/relit_oiio.so
+
 test-build: all $(TESTS)
 
 test: deps
