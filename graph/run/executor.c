@@ -66,7 +66,7 @@ static rl_code make_constants(rl_executor *x, int node, rl_error *err)
         code = upload(x, g->params, g->pass->params_size, &n->params, err);
     if (!code && g->pass->tables) {
         rl_tables t = {0};
-        rl_pass_input in = {.params = g->params, .materials = x->material_table};
+        rl_pass_input in = {.pass = g->pass, .params = g->params, .materials = x->material_table};
         code = g->pass->tables(&in, &x->arena, &t, err);
         if (!code)
             code = upload(x, t.data, t.n * sizeof *t.data, &n->tables, err);
