@@ -139,6 +139,11 @@ test-asan:
 	@$(MAKE) --no-print-directory -j2 BUILD=build-asan SAN="-fsanitize=address,undefined -fno-sanitize-recover=undefined" test-build
 	@BUILD=build-asan ASAN_OPTIONS=detect_leaks=0 tests/run.sh $(patsubst $(BUILD)/%,build-asan/%,$(TESTS))
 
+# Kernels and codecs against their peers; tests/bench_batch.sh says what can be chosen.
+bench: all $(BUILD)/tests/bench_sss $(BUILD)/tests/bench_capture
+	$(BUILD)/tests/bench_sss
+	@BUILD=$(BUILD) tests/bench_batch.sh
+
 # ---- the rest --------------------------------------------------------------------------------------------------
 
 DEB = build-essential pkg-config libopenexr-dev libopenimageio-dev libopencolorio-dev pocl-opencl-icd ocl-icd-opencl-dev \
@@ -178,4 +183,4 @@ layers:
 clean:
 	rm -rf $(BUILD) build-asan
 
-.PHONY: all demo test test-build test-asan deps install format layers clean
+.PHONY: all demo bench test test-build test-asan deps install format layers clean
