@@ -392,21 +392,55 @@ rl_code rl_memory_copy(rl_memory *to, rl_memory *from, rl_error *err)
 /* ---- programs --------------------------------------------------------------------------------------------
  */
 
-/* The first "place: error: text" of a compiler's log becomes the error's place and text. */
-static rl_code fail_build(rl_error *err, const char *name, char *log)
+/* Cuts a severity ("error: ") off the front of *text: 'e', 'w', or 0 where there is none. */
+static char cut_severity(const char **text)
 {
-    for (char *line = strtok(log, "\n"); line; line = strtok(NULL, "\n")) {
-        char file[256];
-        int at_line, column, used = 0;
-        if (sscanf(line, "%255[^:\n]:%d:%d: %n", file, &at_line, &column, &used) == 3 && used > 0) {
-            const char *text = line + used;
-            const char *head = strstr(text, "error: ");
-            if (head || strstr(text, "warning: "))
-                return rl_fail(err, RL_E_BUILD, (rl_where){file, at_line, column}, "%s",
-                               head ? head + 7 : text);
+    static const char *const words[] = {"error: ", "fatal error: ", "warning: "};
+    for (int i = 0; i < 3; i++) {
+        size_t n = strlen(words[i]);
+        if (!strncmp(*text, words[i], n)) {
+            *text += n;
+            return i < 2 ? 'e' : 'w';
         }
     }
-    return rl_fail(err, RL_E_BUILD, RL_NOWHERE, "OpenCL program '%s' does not build", name);
+    return 0;
+}
+
+/* A line of a compiler's log, "error: place: text" (PoCL) or "place: error: text" (clang): its severity, or 0. The
+ * place, "file:line:column", is split in `line` itself. */
+static char split_message(char *line, rl_where *where, const char **text)
+{
+    const char *start = line;
+    char severity = cut_severity(&start);
+    for (char *c = line + (start - line); *c; c++) {
+        int used = 0, at_line, column;
+        if (*c != ':' || sscanf(c, ":%d:%d: %n", &at_line, &column, &used) != 2 || !used)
+            continue;
+        *text = c + used;
+        *c = 0;
+        *where = (rl_where){start, at_line, column};
+        char inner = cut_severity(text);
+        return severity ? severity : inner;
+    }
+    return 0;
+}
+
+/* The first error of a compiler's log, or its first warning when there is none, becomes the error. */
+static rl_code fail_build(rl_error *err, const char *name, char *log)
+{
+    rl_where where, found = RL_NOWHERE;
+    const char *text, *what = NULL;
+    char severity = 0;
+    char *rest = NULL;
+    for (char *line = strtok_r(log, "\n", &rest); line && severity != 'e'; line = strtok_r(NULL, "\n", &rest)) {
+        char s = split_message(line, &where, &text);
+        if (!s || (s == 'w' && severity))
+            continue;
+        severity = s;
+        found = where;
+        what = text;
+    }
+    return rl_fail(err, RL_E_BUILD, found, what ? "%s" : "OpenCL program '%s' does not build", what ? what : name);
 }
 
 static rl_code build_log(rl_program *p, cl_int status, bool strict, rl_error *err)
