@@ -64,9 +64,9 @@ struct rl_program {
 
 static atomic_ulong countdown;
 
-void rl_device_fail_at(unsigned long n)
+unsigned long rl_device_fail_at(unsigned long n)
 {
-    atomic_store(&countdown, n);
+    return atomic_exchange(&countdown, n);
 }
 
 static bool injected(void)
@@ -80,6 +80,13 @@ static bool injected(void)
 
 /* The call's status, or an injected failure without the call. */
 #define CL(call) (injected() ? CL_OUT_OF_RESOURCES : (call))
+
+/* The status of a wait. An injected failure comes behind the call: the device must not be at work on memory that the
+ * caller then frees. */
+static cl_int waited(cl_int status)
+{
+    return injected() ? CL_OUT_OF_RESOURCES : status;
+}
 
 static const char *status_text(cl_int status)
 {
@@ -211,16 +218,18 @@ static rl_code choose(const char *choice, const cl_device_id *ids, const rl_devi
 
 static rl_code open_queues(rl_device *d, rl_error *err)
 {
-    cl_int status = CL_SUCCESS;
+    cl_int status = CL_OUT_OF_RESOURCES;
     d->context = injected() ? NULL : clCreateContext(NULL, 1, &d->id, NULL, NULL, &status);
     if (!d->context)
         return fail_cl(err, status, "the context cannot be made");
+    status = CL_OUT_OF_RESOURCES;
     d->queue =
         injected() ? NULL : clCreateCommandQueue(d->context, d->id, CL_QUEUE_PROFILING_ENABLE, &status);
-    d->mapper = injected() ? NULL : clCreateCommandQueue(d->context, d->id, 0, &status);
-    if (!d->queue || !d->mapper)
+    if (!d->queue)
         return fail_cl(err, status, "the queue cannot be made");
-    return RL_OK;
+    status = CL_OUT_OF_RESOURCES;
+    d->mapper = injected() ? NULL : clCreateCommandQueue(d->context, d->id, 0, &status);
+    return d->mapper ? RL_OK : fail_cl(err, status, "the queue cannot be made");
 }
 
 rl_code rl_device_open(const char *choice, int threads, const rl_log *log, rl_device **out, rl_error *err)
@@ -375,7 +384,7 @@ rl_code rl_memory_unmap(rl_memory *memory, rl_error *err)
         CL(clEnqueueUnmapMemObject(memory->device->mapper, memory->mem, memory->mapped, 0, NULL, &done));
     memory->mapped = NULL;
     if (status == CL_SUCCESS)
-        status = CL(clWaitForEvents(1, &done));
+        status = waited(clWaitForEvents(1, &done));
     if (done)
         clReleaseEvent(done);
     return status == CL_SUCCESS ? RL_OK : fail_cl(err, status, "a buffer cannot be unmapped");
@@ -628,7 +637,7 @@ rl_code rl_device_run(rl_device *device, rl_program *program, const rl_dispatch 
 
 rl_code rl_device_finish(rl_device *device, rl_error *err)
 {
-    cl_int status = CL(clFinish(device->queue));
+    cl_int status = waited(clFinish(device->queue));
     for (size_t i = device->n_spans; i-- > 0;) {
         read_span(device, device->spans[i].event, device->spans[i].out);
         clReleaseEvent(device->spans[i].event);
