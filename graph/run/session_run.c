@@ -72,9 +72,9 @@ typedef struct writing {
 } writing;
 
 /* The stencil goes out as the ids of the capture, not as dense indices. */
-static void restore_ids(const rl_frame *f, const rl_wanted *w, size_t layer, rl_sink_image *image)
+static void restore_ids(const rl_frame *f, const char *name, rl_sink_image *image)
 {
-    if (strcmp(w->layers[layer].image, "capture.stencil") || !f->ids)
+    if (strcmp(name, "capture.stencil") || !f->ids)
         return;
     image->plane[0] = (const float *)(const void *)f->ids;
     image->stride = (size_t)f->geometry.width;
@@ -90,7 +90,7 @@ static rl_code write_output(rl_session *s, rl_sequence *q, rl_frame *f, size_t o
         code = rl_session_map_image(q, f, q->plan->outputs[output][i], &wr.images[i], &wr.memory[i], err);
         wr.images[i].name = w->layers[i].name;
         if (!code)
-            restore_ids(f, w, i, &wr.images[i]);
+            restore_ids(f, w->layers[i].image, &wr.images[i]);
         wr.n = i + 1;
     }
     if (!code)
@@ -360,6 +360,7 @@ rl_code rl_session_image(rl_session *s, const char *image, rl_image_view *out, r
     rl_code code = rl_session_map_image(q, &s->frame, buffer, &view, &memory, err);
     if (code)
         return code;
+    restore_ids(&s->frame, image, &view);
     *out = (rl_image_view){.x = s->frame.geometry.x,
                            .y = s->frame.geometry.y,
                            .width = s->frame.geometry.width,
