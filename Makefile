@@ -26,6 +26,15 @@ CPPFLAGS += -I. $(shell pkg-config --cflags $(PKGS) 2>/dev/null)
 LDFLAGS  += $(SAN) -pthread -Wl,--as-needed
 LIBS      = $(shell pkg-config --libs $(PKGS) OpenColorIO) -lOpenCL -lstdc++ -ldl -lm
 
+# `make V=1` shows whole commands.
+ifeq ($(V),1)
+say =
+Q   =
+else
+say = @echo "  $(1)"
+Q   = @
+endif
+
 # ---- what is built -------------------------------------------------------------------------------------------
 
 # OpenImageIO takes a quarter of a second to load: its shim is a module of its own, loaded on first use.
@@ -44,18 +53,21 @@ all: $(BUILD)/relit $(BUILD)/librelit.a $(BUILD)/librelit.so $(BUILD)/relit_oiio
 
 $(BUILD)/%.o: %.c
 	@mkdir -p $(@D)
-	$(CC) $(CPPFLAGS) $(CFLAGS) -MMD -MP -c $< -o $@
+	$(call say,cc   $<)
+	$(Q)$(CC) $(CPPFLAGS) $(CFLAGS) -MMD -MP -c $< -o $@
 
 $(BUILD)/%.o: %.cc
 	@mkdir -p $(@D)
-	$(CXX) $(CPPFLAGS) $(CXXFLAGS) -MMD -MP -c $< -o $@
+	$(call say,c++  $<)
+	$(Q)$(CXX) $(CPPFLAGS) $(CXXFLAGS) -MMD -MP -c $< -o $@
 
 $(BUILD)/librelit.a: $(LIB_O)
 	@rm -f $@
 	@ar rcs $@ $^
 
 $(BUILD)/librelit.so: $(LIB_O)
-	$(CC) $(LDFLAGS) -shared -Wl,-soname,librelit.so -o $@ $^ $(LIBS)
+	$(call say,link $@)
+	$(Q)$(CC) $(LDFLAGS) -shared -Wl,-soname,librelit.so -o $@ $^ $(LIBS)
 
 # All of the tool but main(): tests call it in their own process.
 $(BUILD)/tool.a: $(filter-out $(MAIN_O),$(TOOL_O))
@@ -63,10 +75,12 @@ $(BUILD)/tool.a: $(filter-out $(MAIN_O),$(TOOL_O))
 	@ar rcs $@ $^
 
 $(BUILD)/relit: $(MAIN_O) $(BUILD)/tool.a $(BUILD)/librelit.a
-	$(CC) $(LDFLAGS) -o $@ $^ $(LIBS)
+	$(call say,link $@)
+	$(Q)$(CC) $(LDFLAGS) -o $@ $^ $(LIBS)
 
 $(BUILD)/relit_oiio.so: $(MODULE_CXX:%.cc=$(BUILD)/%.o)
-	$(CXX) $(LDFLAGS) -shared -o $@ $^ $(shell pkg-config --libs OpenImageIO)
+	$(call say,link $@)
+	$(Q)$(CXX) $(LDFLAGS) -shared -o $@ $^ $(shell pkg-config --libs OpenImageIO)
 
 # Kernels are built into the library, so that it runs from anywhere; $RELIT_KERNELS overrides them.
 $(BUILD)/kernels.c: $(KERNELS) Makefile
@@ -80,7 +94,7 @@ $(BUILD)/kernels.c: $(KERNELS) Makefile
 	  n=0; for k in $(KERNELS); do echo "{\"$$(basename $$k)\", k$$n},"; n=$$((n+1)); done; \
 	  echo '{0, 0}};'; } > $@.tmp && mv $@.tmp $@
 $(BUILD)/kernels.o: $(BUILD)/kernels.c
-	$(CC) $(CPPFLAGS) $(CFLAGS) -c $< -o $@
+	$(Q)$(CC) $(CPPFLAGS) $(CFLAGS) -c $< -o $@
 
 # Where `make install` puts things that are looked for at run time; a build tree finds its own first.
 $(BUILD)/graph/run/image_module.o: CPPFLAGS += -DRL_MODULE_DIR='"$(PREFIX)/lib/relit"'
@@ -106,7 +120,8 @@ $(BUILD)/tests/help.a: $(HELP_O)
 	@ar rcs $@ $^
 
 $(BUILD)/tests/%: $(BUILD)/tests/%.o $(BUILD)/tests/sanitizers.o $(BUILD)/tests/help.a $(BUILD)/tool.a $(BUILD)/librelit.a
-	$(CC) $(LDFLAGS) -o $@ $^ $(LIBS) -lcmocka
+	$(call say,link $@)
+	$(Q)$(CC) $(LDFLAGS) -o $@ $^ $(LIBS) -lcmocka
 
 # It loads the module; so does whatever writes PNG files.
 $(BUILD)/tests/test_image_file: | $(BUILD)/relit_oiio.so

@@ -258,10 +258,12 @@ static void nonfinite_values(void **state)
     for (int t = 0; t < 3; t++) {
         static float out[3][H * W];
         rl_exr_plane planes[] = {
-            {.channel = "f",      .floats = out[0], .stride = W  },
-            {                 .channel = "h",               .floats = out[1],                        .stride = W},
-            { .channel = "h", .floats = out[2],                 .stride = W,                               .replace_inf = true, .inf_value = 1e10f}
+            {.channel = "f", .floats = out[0], .stride = W},
+            {.channel = "h", .floats = out[1], .stride = W},
+            {.channel = "h", .floats = out[2], .stride = W}
         };
+        planes[2].replace_inf = true;
+        planes[2].inf_value = 1e10f;
         good(rl_exr_read(file, 0, planes, 3, NULL, pools[t], &err), &err);
         assert_int_equal(planes[0].nonfinite, bad);
         assert_int_equal(planes[1].nonfinite, bad);
