@@ -103,7 +103,7 @@ double capture_error(const rl_image_view *image, const scene *truth, int plane, 
         for (size_t i = 0; i < truth->n; i++) {
             double t = truth->plane[plane + c][i];
             double v = (double)image->plane[c][i / (size_t)truth->width * image->stride + i % (size_t)truth->width];
-            if (isnan(t))
+            if (plane == SCENE_NORMAL && !truth->id[i])
                 continue;
             double d = fabs(v - t);
             worst = d > worst || isnan(d) ? d : worst;

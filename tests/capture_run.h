@@ -19,8 +19,8 @@ rl_session *capture_open(const char *path, const char *pipeline, const rl_option
 /* The image of the frame that was processed last, or a failed test. */
 rl_image_view capture_image(rl_session *s, const char *name);
 
-/* The largest |image - truth| over all planes, divided by `scale` (0: by the largest truth); pixels where truth is NaN are
- * left out. */
+/* The largest |image - truth| over all planes, divided by `scale` (0: by the largest truth). Empty pixels have no
+ * normal to compare. */
 double capture_error(const rl_image_view *image, const scene *truth, int plane, int planes, double scale);
 
 /* Warnings since capture_start or capture_log_clear. */

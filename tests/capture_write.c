@@ -19,16 +19,16 @@ enum { MOST = 3, LAYERS = 8 };
 static const struct {
     const char *name;
     int plane, n;
-    const char *letters; /* of its channels */
+    const char *full[MOST], *bare[MOST]; /* channels where layers share a file, and where each has its own */
 } layers[LAYERS] = {
-    {"albedo",     SCENE_ALBEDO,     3, "RGB"},
-    {"normal",     SCENE_NORMAL,     3, "XYZ"},
-    {"depth",      SCENE_DEPTH,      1, "Z"  },
-    {"stencil",    -1,               1, "I"  },
-    {"thickness",  SCENE_THICKNESS,  1, "T"  },
-    {"motion",     SCENE_MOTION,     2, "XY" },
-    {"shadow.key", SCENE_SHADOW,     1, "V"  },
-    {"shadow.rim", SCENE_SHADOW + 1, 1, "V"  },
+    {"albedo", SCENE_ALBEDO, 3, {"albedo.R", "albedo.G", "albedo.B"}, {"R", "G", "B"}},
+    {"normal", SCENE_NORMAL, 3, {"normal.X", "normal.Y", "normal.Z"}, {"X", "Y", "Z"}},
+    {"depth", SCENE_DEPTH, 1, {"depth.Z"}, {"Z"}},
+    {"stencil", -1, 1, {"stencil.ID"}, {"ID"}},
+    {"thickness", SCENE_THICKNESS, 1, {"thickness.T"}, {"T"}},
+    {"motion", SCENE_MOTION, 2, {"motion.X", "motion.Y"}, {"X", "Y"}},
+    {"shadow.key", SCENE_SHADOW, 1, {"shadow.key"}, {"V"}},
+    {"shadow.rim", SCENE_SHADOW + 1, 1, {"shadow.rim"}, {"V"}},
 };
 
 static double metres(const capture_form *f)
@@ -143,7 +143,6 @@ static void *narrow(const double *in, size_t n, rl_exr_pixel type)
 
 typedef struct drawn {
     made_channel channel[LAYERS * MOST];
-    char names[LAYERS * MOST][32];
     int n;
 } drawn;
 
@@ -163,11 +162,10 @@ static void draw(const capture_form *f, const scene *s, int layer, bool bare, dr
     if (f->spoil)
         f->spoil(layers[layer].name, plane, n, s->n);
     for (int c = 0; c < n; c++, d->n++) {
-        snprintf(d->names[d->n], sizeof d->names[0], bare ? "%.0s%c" : "%s.%c", layers[layer].name,
-                 layers[layer].letters[c]);
         rl_exr_pixel type = type_of(f, layer);
-        d->channel[d->n] =
-            (made_channel){.name = d->names[d->n], .type = type, .pixels = narrow(plane[c], s->n, type)};
+        d->channel[d->n] = (made_channel){.name = bare ? layers[layer].bare[c] : layers[layer].full[c],
+                                          .type = type,
+                                          .pixels = narrow(plane[c], s->n, type)};
     }
     for (int c = 0; c < MOST; c++)
         free(plane[c]);
@@ -222,7 +220,7 @@ static void fill_header(const capture_form *f, const scene_camera *c, float matr
     *h = (made_header){.aspect = (float)c->aspect,
                        .screen_width = (float)(2 * tan(c->fov_x / 2)),
                        .screen_center = {(float)c->center[0], (float)c->center[1]},
-                       .matrix = f->camera == CAMERA_HEADER ? matrix : NULL,
+                       .matrix = f->camera == CAMERA_HEADER && !f->no_matrix ? matrix : NULL,
                        .fov_x = f->fov == FOV_HEADER ? (float)c->fov_x : 0,
                        .jitter = f->jitter_in_manifest ? NULL : jitter,
                        .fps = {f->fps[0], f->fps[1]},
@@ -338,8 +336,7 @@ static void print_layers(rl_str *y, const capture_form *f)
             rl_str_add(y, "  shadow:\n");
         rl_str_printf(y, i < 6 ? "  %s: {channels: [" : "    %.3s: {channels: [", layers[i].name + (i < 6 ? 0 : 7));
         for (int c = 0; c < channels_of(f, i); c++)
-            rl_str_printf(y, f->files == FILES_ONE ? "%s\"%s.%c\"" : "%s%.0s\"%c\"", c ? ", " : "", layers[i].name,
-                          layers[i].letters[c]);
+            rl_str_printf(y, "%s\"%s\"", c ? ", " : "", f->files == FILES_ONE ? layers[i].full[c] : layers[i].bare[c]);
         rl_str_add(y, "]");
         print_keys(y, f, i);
         if (f->files == FILES_PARTS)
@@ -394,7 +391,7 @@ static void print_lights(rl_str *y, const capture_form *f)
 void capture_manifest(const char *folder, const capture_form *f, const scene *s, int n)
 {
     rl_str y = {0};
-    rl_str_printf(&y, "relit_capture: 1\nname: cap\nunit: %s\n", f->unit ? f->unit : "m");
+    rl_str_printf(&y, "relit_capture: 1\nname: %s\nunit: %s\n", f->title ? f->title : "cap", f->unit ? f->unit : "m");
     print_files(&y, f);
     print_camera(&y, f, s, n);
     print_layers(&y, f);

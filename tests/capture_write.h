@@ -16,7 +16,8 @@ typedef enum capture_motion { MOTION_PIXELS, MOTION_UV, MOTION_NDC } capture_mot
 
 /* All zero: one float scanline file a frame, metres, planar, world normals, camera in the header. */
 typedef struct capture_form {
-    const char *name;
+    const char *name;         /* for people */
+    const char *title;        /* the manifest's `name`; NULL: cap */
     capture_files files;
     rl_exr_pixel pixel;       /* RL_EXR_HALF, else float */
     rl_exr_pixel stencil;     /* 0 is RL_EXR_UINT */
@@ -44,7 +45,7 @@ typedef struct capture_form {
     const char *stencil_names, *frames, *extra; /* further lines of the manifest, or NULL */
     const char *shadows;      /* NULL: {key: …, rim: …} by their names */
     const char *lights;       /* NULL: the scene's */
-    bool no_lights;
+    bool no_lights, no_matrix; /* the header's matrix is left out */
     const uint32_t *time_code;
     int fps[2];
     const char *owner;

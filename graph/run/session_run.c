@@ -18,11 +18,12 @@ static double now_s(void)
 }
 
 /* Buffers follow the size of the frame that they hold. */
-static rl_code fit_buffers(rl_sequence *q, rl_frame *f, const rl_geometry *before, rl_error *err)
+static rl_code fit_buffers(rl_sequence *q, rl_frame *f, rl_error *err)
 {
-    if (f->buffers && !memcmp(before, &f->geometry, sizeof *before))
+    if (f->buffers && !memcmp(&f->fitted, &f->geometry, sizeof f->fitted))
         return RL_OK;
     rl_frame_buffers_free(&f->buffers);
+    f->fitted = f->geometry;
     return rl_frame_buffers_new(q->executor, &f->geometry, &f->buffers, err);
 }
 
@@ -139,7 +140,9 @@ typedef struct batch_state {
     rl_session *s;
     rl_sequence *q;
     rl_frame frames[MOST_IN_FLIGHT];
-    bool skipped[MOST_IN_FLIGHT];
+    bool skipped[MOST_IN_FLIGHT], held[MOST_IN_FLIGHT];
+    bool has_good; /* the loader's: a frame was read, `good`; it is what --on-missing hold shows */
+    int good;
     const rl_run_hooks *hooks;
     rl_run_summary *summary;
     size_t done_before, total;
@@ -148,23 +151,51 @@ typedef struct batch_state {
     camera_t camera;
 } batch_state;
 
+/* The frame of a number, under the files of another one when that is held. */
+static rl_code load_frame(batch_state *b, rl_frame *f, int file_number, rl_error *err)
+{
+    f->nonfinite = f->clamped = 0;
+    rl_code code = rl_reader_open(b->q->reader, file_number, f, err);
+    if (!code)
+        code = fit_buffers(b->q, f, err);
+    return code ? code : rl_reader_pixels(b->q->reader, f, b->s->pool, err);
+}
+
+/* A frame whose files are missing or broken: what --on-missing says. */
+static void miss_frame(batch_state *b, rl_frame *f, int slot)
+{
+    rl_on_missing how = b->s->options.on_missing;
+    rl_error why = f->error;
+    rl_where where = {.file = why.file};
+    if (how == RL_MISSING_SKIP) {
+        rl_report(b->s->log, RL_WARNING, where, "frame %d is skipped: %s", f->number, why.text);
+        b->skipped[slot] = true;
+    } else if (how == RL_MISSING_HOLD && b->has_good) {
+        rl_report(b->s->log, RL_WARNING, where, "frame %d holds the layers of frame %d: %s", f->number, b->good, why.text);
+        f->error = (rl_error){0};
+        b->held[slot] = true;
+        load_frame(b, f, b->good, &f->error);
+    } else if (how == RL_MISSING_HOLD) {
+        rl_fail(&f->error, why.code, where, "%s (there is no frame before it to hold)", why.text);
+    }
+}
+
 static void batch_load(void *ctx, size_t item, int slot)
 {
     batch_state *b = ctx;
     rl_frame *f = &b->frames[slot];
-    rl_geometry before = f->geometry;
     double start = now_s();
     f->number = b->q->frames.numbers[item];
     f->error = (rl_error){0};
     f->run_s = f->write_s = 0;
     f->clipped = 0;
-    b->skipped[slot] = false;
-    if (!rl_reader_open(b->q->reader, f->number, f, &f->error) && !fit_buffers(b->q, f, &before, &f->error))
-        rl_reader_pixels(b->q->reader, f, b->s->pool, &f->error);
-    if (f->error.code == RL_E_IO && b->s->options.on_missing == RL_MISSING_SKIP) {
-        rl_report(b->s->log, RL_WARNING, (rl_where){.file = f->error.file}, "frame %d is skipped: %s", f->number,
-                  f->error.text);
-        b->skipped[slot] = true;
+    b->skipped[slot] = b->held[slot] = false;
+    load_frame(b, f, f->number, &f->error);
+    if (rl_reader_missed(f->error.code)) {
+        miss_frame(b, f, slot);
+    } else if (!f->error.code) {
+        b->has_good = true;
+        b->good = f->number;
     }
     f->load_s = now_s() - start;
 }
@@ -185,10 +216,10 @@ static void batch_run(void *ctx, size_t item, int slot)
     batch_state *b = ctx;
     rl_frame *f = &b->frames[slot];
     double start = now_s();
-    bool cut = f->error.code || is_cut(b, f);
+    bool cut = f->error.code || b->held[slot] || is_cut(b, f);
     if (!f->error.code)
         rl_session_execute(b->s, b->q, f, cut, &f->error);
-    b->history = !f->error.code;
+    b->history = !f->error.code && !b->held[slot]; /* a held frame is no past of the next one */
     b->previous = f->number;
     b->camera = f->camera;
     f->run_s = now_s() - start;
@@ -319,12 +350,11 @@ rl_code rl_session_process(rl_session *s, size_t capture, long long number, cons
     rl_frame *f = &s->frame;
     if (s->frame_sequence != q)
         rl_frame_free(f);
-    rl_geometry before = f->geometry;
     s->frame_sequence = q;
     f->number = (int)number;
     code = data ? rl_reader_memory(q->reader, data, f, err) : rl_reader_open(q->reader, f->number, f, err);
     if (!code)
-        code = fit_buffers(q, f, &before, err);
+        code = fit_buffers(q, f, err);
     if (!code)
         code = data ? rl_reader_memory_pixels(q->reader, data, f, s->pool, err) : rl_reader_pixels(q->reader, f, s->pool, err);
     if (!code)
