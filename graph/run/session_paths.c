@@ -1,37 +1,69 @@
-/* Which files a run writes: every name of every output, capture and frame, and whether one comes twice. Names
- * are compared by hash, and spelled again only where hashes agree. */
+/* Which files a run writes: every name of every output, capture and frame, whether one comes twice, and
+ * whether one is a file that is read. Names are compared by hash, and spelled again only where hashes agree.
+ */
 #include <stdlib.h>
 #include <string.h>
 #include <xxhash.h>
 
 #include "graph/base/alloc.h"
+#include "graph/base/file.h"
 #include "graph/run/session.h"
+
+enum { INPUT = 1 << 30 }; /* an `output` from here on is a pattern of the capture, which is read */
 
 typedef struct written {
     uint64_t hash;
-    unsigned output, sequence;
-    int frame;
+    int output, sequence, frame;
 } written;
 
-static rl_code spell(const rl_session *s, rl_arena *arena, const written *w, const char **out, rl_error *err)
+typedef struct lister {
+    const rl_session *s;
+    const char
+        *out; /* where outputs go, without links; NULL: not there yet, so nothing that is read can be in it */
+    written *list;
+    size_t n;
+} lister;
+
+/* A path whose folder has no links, so that one file has one spelling; as it is when there is no such folder.
+ */
+static const char *resolve(rl_arena *arena, const char *path)
 {
-    return rl_output_path(arena, s->outputs[w->output].spec, s->sequences[w->sequence].manifest->name,
-                          w->frame, NULL, out, err);
+    char *folder = rl_path_folder(arena, path),
+         *real = folder ? realpath(*folder ? folder : ".", NULL) : NULL;
+    const char *out = real ? rl_path_join(arena, real, rl_path_name(path)) : path;
+    free(real);
+    return out;
+}
+
+static rl_code spell(const lister *l, rl_arena *arena, const written *w, const char **out, rl_error *err)
+{
+    const rl_manifest *m = l->s->sequences[w->sequence].manifest;
+    rl_code code = RL_OK;
+    if (w->output >= INPUT) {
+        const rl_layer layer = {.pattern = w->output - INPUT};
+        const char *path = rl_manifest_path(arena, m, &layer, w->frame);
+        *out = path ? resolve(arena, path) : NULL;
+    } else {
+        code = rl_output_path(arena, l->s->outputs[w->output].spec, m->name, w->frame, NULL, out, err);
+        if (!code && l->out)
+            *out = rl_path_join(arena, l->out, *out);
+    }
+    return code ? code : *out ? RL_OK : rl_fail_memory(err, 1);
 }
 
 /* Bounded memory: the names of a sequence's frames are forgotten a thousand at a time. */
-static rl_code list_sequence(const rl_session *s, unsigned output, unsigned sequence, written *list,
-                             rl_error *err)
+static rl_code list_files(lister *l, int output, int sequence, rl_error *err)
 {
-    const rl_frames *frames = &s->sequences[sequence].frames;
+    const rl_frames *frames = &l->s->sequences[sequence].frames;
     rl_arena arena = {0};
     rl_code code = RL_OK;
     for (size_t i = 0; i < frames->n && !code; i++) {
         const char *path = NULL;
-        list[i] = (written){.output = output, .sequence = sequence, .frame = frames->numbers[i]};
-        code = spell(s, &arena, &list[i], &path, err);
+        written *w = &l->list[l->n++];
+        *w = (written){.output = output, .sequence = sequence, .frame = frames->numbers[i]};
+        code = spell(l, &arena, w, &path, err);
         if (!code)
-            list[i].hash = XXH3_64bits(path, strlen(path));
+            w->hash = XXH3_64bits(path, strlen(path));
         if (i % 1000 == 999)
             rl_arena_free(&arena);
     }
@@ -39,22 +71,15 @@ static rl_code list_sequence(const rl_session *s, unsigned output, unsigned sequ
     return code;
 }
 
-/* By hash; then in the order of the run, so that the same pair is named every time. */
-static int by_hash(const void *a, const void *b)
-{
-    const written *x = a, *y = b;
-    if (x->hash != y->hash)
-        return x->hash < y->hash ? -1 : 1;
-    if (x->sequence != y->sequence)
-        return x->sequence < y->sequence ? -1 : 1;
-    if (x->output != y->output)
-        return x->output < y->output ? -1 : 1;
-    return x->frame < y->frame ? -1 : x->frame > y->frame;
-}
-
 static rl_code collide(const rl_session *s, const written *a, const written *b, const char *path,
                        rl_error *err)
 {
+    if (b->output >= INPUT)
+        return rl_fail(err, RL_E_CONFIG, s->outputs[a->output].spec->file_where,
+                       "output '%s': '%s' is read as frame %d of capture '%s' and would be written over; "
+                       "choose another --out or 'file'",
+                       s->outputs[a->output].spec->name, path, b->frame,
+                       s->sequences[b->sequence].manifest->name);
     const rl_output *first = s->outputs[a->output].spec, *second = s->outputs[b->output].spec;
     const char *x = s->sequences[a->sequence].manifest->name, *y = s->sequences[b->sequence].manifest->name;
     if (a->output != b->output)
@@ -71,19 +96,35 @@ static rl_code collide(const rl_session *s, const written *a, const written *b, 
                    strcmp(x, y) ? "put {capture} into 'file'" : "give one another 'name' in its manifest");
 }
 
-static rl_code compare(const rl_session *s, const written *list, size_t n, rl_error *err)
+/* By hash; then what is written before what is only read; then in the order of the run, so that the same pair
+ * is named every time. */
+static int by_hash(const void *a, const void *b)
+{
+    const written *x = a, *y = b;
+    int reads = (x->output >= INPUT) - (y->output >= INPUT);
+    if (x->hash != y->hash)
+        return x->hash < y->hash ? -1 : 1;
+    if (reads || x->sequence != y->sequence)
+        return reads ? reads : x->sequence - y->sequence;
+    if (x->output != y->output)
+        return x->output - y->output;
+    return x->frame < y->frame ? -1 : x->frame > y->frame;
+}
+
+static rl_code compare(const lister *l, rl_error *err)
 {
     rl_code code = RL_OK;
-    for (size_t i = 1; i < n && !code; i++) {
+    for (size_t i = 1; i < l->n && !code; i++) {
+        const written *w = &l->list[i - 1];
         rl_arena arena = {0};
         const char *a = NULL, *b = NULL;
-        if (list[i].hash != list[i - 1].hash)
+        if (w[0].hash != w[1].hash || w[0].output >= INPUT)
             continue;
-        code = spell(s, &arena, &list[i - 1], &a, err);
+        code = spell(l, &arena, &w[0], &a, err);
         if (!code)
-            code = spell(s, &arena, &list[i], &b, err);
+            code = spell(l, &arena, &w[1], &b, err);
         if (!code && !strcmp(a, b))
-            code = collide(s, &list[i - 1], &list[i], a, err);
+            code = collide(l->s, &w[0], &w[1], a, err);
         rl_arena_free(&arena);
     }
     return code;
@@ -91,21 +132,23 @@ static rl_code compare(const rl_session *s, const written *list, size_t n, rl_er
 
 rl_code rl_session_paths(rl_session *s, rl_error *err)
 {
-    size_t n = 0, most = 0;
+    char *out = realpath(s->options.out ? s->options.out : "out", NULL);
+    size_t most = 1;
     for (size_t q = 0; q < s->n_sequences; q++)
-        most += s->sequences[q].frames.n * s->n_outputs;
-    written *list = rl_malloc((most + 1) * sizeof *list);
-    rl_code code = list ? RL_OK : rl_fail_memory(err, most * sizeof *list);
-    for (unsigned o = 0; o < s->n_outputs && !code; o++) {
-        for (unsigned q = 0; q < s->n_sequences && !code; q++) {
-            code = list_sequence(s, o, q, list + n, err);
-            n += s->sequences[q].frames.n;
-        }
+        most += s->sequences[q].frames.n * (s->n_outputs + (size_t)s->sequences[q].manifest->n_patterns);
+    lister l = {.s = s, .out = out, .list = rl_malloc(most * sizeof *l.list)};
+    rl_code code = l.list ? RL_OK : rl_fail_memory(err, most * sizeof *l.list);
+    for (int q = 0; q < (int)s->n_sequences; q++) {
+        for (int o = 0; o < (int)s->n_outputs && !code; o++)
+            code = list_files(&l, o, q, err);
+        for (int p = 0; out && p < s->sequences[q].manifest->n_patterns && !code; p++)
+            code = list_files(&l, INPUT + p, q, err);
     }
     if (!code) {
-        qsort(list, n, sizeof *list, by_hash);
-        code = compare(s, list, n, err);
+        qsort(l.list, l.n, sizeof *l.list, by_hash);
+        code = compare(&l, err);
     }
-    rl_free(list);
+    rl_free(l.list);
+    free(out);
     return code;
 }

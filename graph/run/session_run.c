@@ -176,6 +176,7 @@ static void miss_frame(batch_state *b, rl_frame *f, int slot)
         b->held[slot] = true;
         load_frame(b, f, b->good, &f->error);
     } else if (how == RL_MISSING_HOLD) {
+        f->error = (rl_error){0};
         rl_fail(&f->error, why.code, where, "%s (there is no frame before it to hold)", why.text);
     }
 }
