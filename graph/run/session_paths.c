@@ -111,22 +111,40 @@ static int by_hash(const void *a, const void *b)
     return x->frame < y->frame ? -1 : x->frame > y->frame;
 }
 
+/* Whether both are one file; *path is its name. */
+static rl_code same_file(const lister *l, rl_arena *arena, const written *w, const char **path, bool *same,
+                         rl_error *err)
+{
+    const char *second = NULL;
+    rl_code code = spell(l, arena, &w[0], path, err);
+    if (!code)
+        code = spell(l, arena, &w[1], &second, err);
+    *same = !code && !strcmp(*path, second);
+    return code;
+}
+
+/* The first that a run would come to is reported. */
 static rl_code compare(const lister *l, rl_error *err)
 {
+    const written *found = NULL;
+    rl_arena arena = {0};
+    const char *path = NULL, *first = NULL;
     rl_code code = RL_OK;
     for (size_t i = 1; i < l->n && !code; i++) {
         const written *w = &l->list[i - 1];
-        rl_arena arena = {0};
-        const char *a = NULL, *b = NULL;
-        if (w[0].hash != w[1].hash || w[0].output >= INPUT)
+        bool same = false, earlier = !found || w->sequence < found->sequence ||
+                                     (w->sequence == found->sequence && w->frame < found->frame);
+        if (w[0].hash != w[1].hash || w[0].output >= INPUT || !earlier)
             continue;
-        code = spell(l, &arena, &w[0], &a, err);
-        if (!code)
-            code = spell(l, &arena, &w[1], &b, err);
-        if (!code && !strcmp(a, b))
-            code = collide(l->s, &w[0], &w[1], a, err);
-        rl_arena_free(&arena);
+        code = same_file(l, &arena, w, &path, &same, err);
+        if (same) {
+            found = w;
+            first = path;
+        }
     }
+    if (!code && found)
+        code = collide(l->s, &found[0], &found[1], first, err);
+    rl_arena_free(&arena);
     return code;
 }
 
