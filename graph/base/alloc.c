@@ -108,8 +108,8 @@ void rl_alloc_reset_peak(void)
     atomic_store(&peak, atomic_load(&live));
 }
 
-void rl_alloc_fail_at(unsigned long n, int for_good)
+unsigned long rl_alloc_fail_at(unsigned long n, int for_good)
 {
     atomic_store(&keep_failing, for_good);
-    atomic_store(&countdown, n);
+    return atomic_exchange(&countdown, n);
 }
