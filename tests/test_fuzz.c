@@ -11,8 +11,9 @@
 static void test_target(void **state)
 {
     const fuzz_target *target = *state;
-    uint64_t n = fuzz_run(target, 20261122, 0, 3000, 1.5);
+    uint64_t fine, n = fuzz_run(target, 20261122, 0, 3000, 1.5, &fine);
     assert_true(n >= 20);
+    assert_true(fine > 0 && fine < n); /* changes are neither all harmless nor all refused at the door */
 }
 
 int main(void)

@@ -37,10 +37,11 @@ int main(int argc, char **argv)
     for (size_t t = 0; t < fuzz_n_targets; t++) {
         if (any && !chosen[t])
             continue;
-        uint64_t n = only == UINT64_MAX ? fuzz_run(&fuzz_targets[t], seed, 0, UINT64_MAX, seconds)
-                                        : fuzz_run(&fuzz_targets[t], seed, only, 1, 3600);
-        printf("%-10s %llu inputs, seed %llu: every promise held\n", fuzz_targets[t].name, (unsigned long long)n,
-               (unsigned long long)seed);
+        uint64_t fine = 0;
+        uint64_t n = only == UINT64_MAX ? fuzz_run(&fuzz_targets[t], seed, 0, UINT64_MAX, seconds, &fine)
+                                        : fuzz_run(&fuzz_targets[t], seed, only, 1, 3600, &fine);
+        printf("%-10s %llu inputs, %llu of them fine, seed %llu: every promise held\n", fuzz_targets[t].name,
+               (unsigned long long)n, (unsigned long long)fine, (unsigned long long)seed);
         fflush(stdout);
     }
     return 0;

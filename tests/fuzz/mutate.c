@@ -149,7 +149,7 @@ size_t fuzz_mutate(const fuzz_target *target, const fuzz_bytes *seeds, size_t n_
     const fuzz_bytes *from = &seeds[below(&r, n_seeds)];
     input in = {out, from->size > FUZZ_MOST_BYTES ? FUZZ_MOST_BYTES : from->size};
     memcpy(out, from->data, in.size);
-    size_t changes = 1 + below(&r, below(&r, 2) ? 3 : 12);
+    size_t changes = below(&r, 3) ? 1 : 1 + below(&r, 12); /* one change gets deepest */
     for (size_t i = 0; i < changes; i++) {
         size_t kind = below(&r, 16);
         if (target->text && kind < 10)

@@ -67,7 +67,7 @@ static fuzz_bytes seed_file(const char *path)
 
 /* ---- configuration --------------------------------------------------------------------------------------- */
 
-static void open_session(const char *folder)
+static bool open_session(const char *folder)
 {
     rl_error err = {0};
     rl_session *session = NULL;
@@ -85,6 +85,7 @@ static void open_session(const char *folder)
     free(pipe);
     if (rl_alloc_live() != before)
         broken("nothing is left behind", &err);
+    return !code;
 }
 
 static const char kernel_pipeline[] =
@@ -133,10 +134,10 @@ static size_t begin_pipeline(const char *folder, fuzz_bytes *seeds, size_t room)
     return n;
 }
 
-static void one_pipeline(const char *folder, const uint8_t *data, size_t size)
+static bool one_pipeline(const char *folder, const uint8_t *data, size_t size)
 {
     write_input(folder, "pipe.yaml", data, size);
-    open_session(folder);
+    return open_session(folder);
 }
 
 static size_t begin_kernel(const char *folder, fuzz_bytes *seeds, size_t room)
@@ -157,10 +158,10 @@ static size_t begin_manifest(const char *folder, fuzz_bytes *seeds, size_t room)
     return n;
 }
 
-static void one_manifest(const char *folder, const uint8_t *data, size_t size)
+static bool one_manifest(const char *folder, const uint8_t *data, size_t size)
 {
     write_input(folder, "capture.yaml", data, size);
-    open_session(folder);
+    return open_session(folder);
 }
 
 /* ---- EXR ------------------------------------------------------------------------------------------------- */
@@ -198,7 +199,7 @@ static size_t begin_exr(const char *folder, fuzz_bytes *seeds, size_t room)
     return n;
 }
 
-static void read_part(const rl_exr *file, int p)
+static bool read_part(const rl_exr *file, int p)
 {
     const rl_exr_part *part = rl_exr_part_at(file, p);
     rl_error err = {0};
@@ -208,6 +209,7 @@ static void read_part(const rl_exr *file, int p)
     rl_str_free(&text);
     size_t pixels = (size_t)part->width * (size_t)part->height;
     float *out = rl_malloc(pixels * sizeof *out);
+    bool fine = false; /* any channel can be read */
     for (size_t i = 0; i < part->n_channels && out && i < 16; i++) {
         rl_exr_plane plane = {.channel = part->channels[i].name, .stride = (size_t)part->width};
         err = (rl_error){0};
@@ -216,11 +218,13 @@ static void read_part(const rl_exr *file, int p)
         else
             plane.floats = out;
         check(rl_exr_read(file, p, &plane, 1, NULL, NULL, &err), &err);
+        fine |= !err.code;
     }
     rl_free(out);
+    return fine;
 }
 
-static void one_exr(const char *folder, const uint8_t *data, size_t size)
+static bool one_exr(const char *folder, const uint8_t *data, size_t size)
 {
     rl_error err = {0};
     rl_exr *file = NULL;
@@ -228,18 +232,122 @@ static void one_exr(const char *folder, const uint8_t *data, size_t size)
     size_t before = rl_alloc_live();
     write_input(folder, "in.exr", data, size);
     check(rl_exr_open(path, LIMIT, &file, &err), &err);
+    bool fine = file != NULL;
     for (int p = 0; file && p < rl_exr_parts(file) && p < 4; p++)
-        read_part(file, p);
+        fine &= read_part(file, p);
     rl_exr_close(&file);
     free(path);
     if (rl_alloc_live() != before)
         broken("nothing is left behind", &err);
+    return fine;
+}
+
+/* ---- frames in memory ------------------------------------------------------------------------------------ */
+
+/* One session processes all inputs: what an input did to it must not hurt the next. */
+static rl_session *frames;
+
+static const char frame_pipeline[] =
+    "relit: 1\n"
+    "capture:\n"
+    "  relit_capture: 1\n"
+    "  name: made\n"
+    "  files: memory\n"
+    "  unit: m\n"
+    "  camera: {matrix: header, forward: -z, fov_x: header, jitter: header}\n"
+    "  layers:\n"
+    "    albedo: {channels: [a, b, c], colorspace: lin_rec709}\n"
+    "    normal: {channels: [d, e], space: camera, encoding: octahedral}\n"
+    "    depth: {channels: [g], kind: radial, empty: 1e10}\n"
+    "    stencil: {channels: [ID]}\n"
+    "    thickness: {channels: [h]}\n"
+    "    motion: {channels: [i, j], unit: pixels, points: previous, y: down}\n"
+    "    roughness: {channels: [k]}\n"
+    "    shadow: {key: l}\n"
+    "    shadow_thickness: {key: m}\n"
+    "profiles: {p: {scatter_distance_mm: [30, 12, 7], transmission: thick}}\n"
+    "materials: {some: {profile: p, stencil: [0, 1, 2, 3]}, default: {}}\n"
+    "lights: {key: {type: point, position: [0.1, 0.2, 0.3], intensity: 1}, sun: {type: directional, direction: [0, 0, -1], irradiance: 3}}\n"
+    "graph:\n"
+    "  light: {pass: lighting}\n"
+    "  sss: {pass: sss_burley, in: {diffuse: light.diffuse, lit: light.lit}, orientation: tangent}\n"
+    "  aa: {pass: taa, in: {color: sss.color}}\n"
+    "outputs: {o: {image: aa.color, file: 'o.{frame}.exr'}}\n";
+
+static size_t begin_frame(const char *folder, fuzz_bytes *seeds, size_t room)
+{
+    (void)folder, (void)room;
+    rl_error err = {0};
+    rl_options options = {.pipeline_text = frame_pipeline, .threads = 2, .memory_limit = LIMIT};
+    if (rl_session_open(&options, &frames, &err) || rl_session_prepare(frames, &err))
+        broken("the frame target's pipeline is fine", &err);
+    for (size_t n = 0; n < 4; n++) { /* sizes, place, camera, then samples */
+        static const float start[] = {50, 40, 0, 0, 0.6f, 0.1f, 0.2f, 0.5f, 0.5f, -0.5f, 0.7f, 0.01f};
+        float v[64];
+        for (size_t i = 0; i < 64; i++)
+            v[i] = i < 12 ? start[i] * (float)(n + 1) : (float)((i * (n + 3)) % 11) * 0.1f;
+        seeds[n].data = malloc(sizeof v);
+        if (!seeds[n].data)
+            abort();
+        memcpy(seeds[n].data, v, seeds[n].size = sizeof v);
+    }
+    return 4;
+}
+
+static int whole(float v, int least, int most)
+{
+    return v >= (float)least && v <= (float)most ? (int)v : least;
+}
+
+static bool one_frame(const char *folder, const uint8_t *data, size_t size)
+{
+    enum { SAMPLES = 200 * 200, CHANNELS = 13 };
+    static float planes[CHANNELS][SAMPLES];
+    static uint32_t ids[SAMPLES];
+    static const char names[] = "a\0b\0c\0d\0e\0f\0g\0h\0i\0j\0k\0l\0m";
+    static long long number;
+    float v[64] = {0};
+    rl_channel_data channels[CHANNELS + 1];
+    rl_error err = {0};
+    (void)folder;
+    memcpy(v, data, size < sizeof v ? size : sizeof v);
+    for (size_t c = 0; c < CHANNELS; c++) {
+        for (size_t i = 0; i < SAMPLES; i++)
+            planes[c][i] = v[12 + (i * (c + 1) + i / 97) % 52];
+        channels[c] = (rl_channel_data){.name = names + 2 * c, .floats = planes[c], .stride = 200};
+    }
+    for (size_t i = 0; i < SAMPLES; i++)
+        memcpy(&ids[i], &planes[0][i / 7], sizeof *ids);
+    channels[CHANNELS] = (rl_channel_data){.name = "ID", .ids = ids, .stride = 200};
+    rl_frame_data frame = {.x = whole(v[2], -100000, 100000),
+                           .y = whole(v[3], -100000, 100000),
+                           .width = whole(v[0], -1, 200),
+                           .height = whole(v[1], -1, 200),
+                           .channels = channels,
+                           .n_channels = CHANNELS + 1,
+                           .world_to_camera = {1, 0, 0, (double)v[7], 0, 1, 0, (double)v[8], 0, 0, 1, (double)v[9], 0, 0, 0, 1},
+                           .fov_x = (double)v[4],
+                           .jitter = {(double)v[5], (double)v[6]}};
+    rl_image_view image;
+    rl_code code = rl_session_process(frames, 0, ++number, &frame, &err);
+    check(code, &err);
+    if (!code)
+        check(rl_session_image(frames, "aa.color", &image, &err), &err);
+    if (!code && (image.width != frame.width || image.height != frame.height))
+        broken("the image has the frame's size", &err);
+    return !code;
+}
+
+static void end_frame(void)
+{
+    rl_session_close(&frames);
 }
 
 const fuzz_target fuzz_targets[] = {
-    {"pipeline", "a pipeline's YAML, up to the plan", true, begin_pipeline, one_pipeline},
-    {"kernel", "a user kernel's declaration, up to the plan", true, begin_kernel, one_pipeline},
-    {"manifest", "a capture's YAML, up to the plan", true, begin_manifest, one_manifest},
-    {"exr", "EXR files: headers, attributes, pixels", false, begin_exr, one_exr},
+    {"pipeline", "a pipeline's YAML, up to the plan", true, begin_pipeline, one_pipeline, NULL},
+    {"kernel", "a user kernel's declaration, up to the plan", true, begin_kernel, one_pipeline, NULL},
+    {"manifest", "a capture's YAML, up to the plan", true, begin_manifest, one_manifest, NULL},
+    {"exr", "EXR files: headers, attributes, pixels", false, begin_exr, one_exr, NULL},
+    {"frame", "frames in memory: sizes, cameras, samples of any value, through the kernels", false, begin_frame, one_frame, end_frame},
 };
 const size_t fuzz_n_targets = sizeof fuzz_targets / sizeof *fuzz_targets;
