@@ -192,8 +192,24 @@ static size_t begin_exr(const char *folder, fuzz_bytes *seeds, size_t room)
         }
         free(path);
     }
+    char *path = path_in(folder, "seed.exr");
+    for (rl_exr_compression c = RL_EXR_DWAA; c <= RL_EXR_DWAB; c++) {
+        const rl_exr_source sources[] = {{"R", RL_EXR_HALF, floats, NULL, W}, {"Z", RL_EXR_FLOAT, floats, NULL, W}};
+        const rl_exr_image image = {.data_window = {0, 0, W - 1, H - 1}, .display_window = {0, 0, W - 1, H - 1},
+                                    .channels = sources, .n_channels = 2, .compression = c};
+        rl_error err = {0};
+        if (rl_exr_write(path, &image, NULL, NULL, &err))
+            broken("a seed can be written", &err);
+        seeds[n++] = seed_file(path);
+    }
+    const made_part parts[] = {
+        {.name = "one", .width = W, .height = H, .compression = RL_EXR_ZIP, .channels = channels, .n_channels = 4},
+        {.name = "two", .width = 8, .height = 8, .compression = RL_EXR_ZIPS, .tile = 8, .mipmap = true, .channels = channels, .n_channels = 2}};
+    made_write(path, parts, 2);
+    seeds[n++] = seed_file(path);
+    free(path);
     small_capture_write(folder);
-    char *path = path_in(folder, "s.0001.exr");
+    path = path_in(folder, "s.0001.exr");
     seeds[n++] = seed_file(path);
     free(path);
     return n;
