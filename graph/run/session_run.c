@@ -71,9 +71,9 @@ typedef struct writing {
 } writing;
 
 /* The stencil goes out as the ids of the capture, not as dense indices. */
-static void restore_ids(const rl_frame *f, const rl_wanted *w, size_t layer, rl_sink_image *image)
+static void restore_ids(const rl_frame *f, const char *name, rl_sink_image *image)
 {
-    if (strcmp(w->layers[layer].image, "capture.stencil") || !f->ids)
+    if (strcmp(name, "capture.stencil") || !f->ids)
         return;
     image->plane[0] = (const float *)(const void *)f->ids;
     image->stride = (size_t)f->geometry.width;
@@ -92,7 +92,7 @@ static rl_code write_output(rl_session *s, rl_sequence *q, rl_frame *f, size_t o
         code = rl_session_map_image(q, f, q->plan->outputs[output][i], &wr.images[i], &wr.memory[i], err);
         wr.images[i].name = w->layers[i].name;
         if (!code)
-            restore_ids(f, w, i, &wr.images[i]);
+            restore_ids(f, w->layers[i].image, &wr.images[i]);
     }
     if (!code)
         code = rl_sink_write(path, &s->outputs[output], wr.images, w->n_layers, frame, s->pool, &f->clipped, err);
@@ -143,7 +143,9 @@ typedef struct batch_state {
     rl_session *s;
     rl_sequence *q;
     rl_frame frames[MOST_IN_FLIGHT];
-    bool skipped[MOST_IN_FLIGHT];
+    bool skipped[MOST_IN_FLIGHT], held[MOST_IN_FLIGHT];
+    bool has_good; /* the loader's: a frame was read, `good`; it is what --on-missing hold shows */
+    int good;
     const rl_run_hooks *hooks;
     rl_run_summary *summary;
     size_t done_before, total;
@@ -151,6 +153,36 @@ typedef struct batch_state {
     int previous;
     camera_t camera;
 } batch_state;
+
+/* The frame of a number, under the files of another one when that is held. */
+static rl_code load_frame(batch_state *b, rl_frame *f, int file_number, rl_error *err)
+{
+    f->nonfinite = f->clamped = 0;
+    rl_code code = rl_reader_open(b->q->reader, file_number, f, err);
+    if (!code)
+        code = fit_buffers(b->q, f, err);
+    return code ? code : rl_reader_pixels(b->q->reader, f, b->s->pool, err);
+}
+
+/* A frame whose files are missing or broken: what --on-missing says. */
+static void miss_frame(batch_state *b, rl_frame *f, int slot)
+{
+    rl_on_missing how = b->s->options.on_missing;
+    rl_error why = f->error;
+    rl_where where = {.file = why.file};
+    if (how == RL_MISSING_SKIP) {
+        rl_report(b->s->log, RL_WARNING, where, "frame %d is skipped: %s", f->number, why.text);
+        b->skipped[slot] = true;
+    } else if (how == RL_MISSING_HOLD && b->has_good) {
+        rl_report(b->s->log, RL_WARNING, where, "frame %d holds the layers of frame %d: %s", f->number, b->good, why.text);
+        f->error = (rl_error){0};
+        b->held[slot] = true;
+        load_frame(b, f, b->good, &f->error);
+    } else if (how == RL_MISSING_HOLD) {
+        f->error = (rl_error){0};
+        rl_fail(&f->error, why.code, where, "%s (there is no frame before it to hold)", why.text);
+    }
+}
 
 static void batch_load(void *ctx, size_t item, int slot)
 {
@@ -161,13 +193,13 @@ static void batch_load(void *ctx, size_t item, int slot)
     f->error = (rl_error){0};
     f->run_s = f->write_s = 0;
     f->nonfinite = f->clamped = f->clipped = 0;
-    b->skipped[slot] = false;
-    if (!rl_reader_open(b->q->reader, f->number, f, &f->error) && !fit_buffers(b->q, f, &f->error))
-        rl_reader_pixels(b->q->reader, f, b->s->pool, &f->error);
-    if (f->error.code == RL_E_IO && b->s->options.on_missing == RL_MISSING_SKIP) {
-        rl_report(b->s->log, RL_WARNING, (rl_where){.file = f->error.file}, "frame %d is skipped: %s", f->number,
-                  f->error.text);
-        b->skipped[slot] = true;
+    b->skipped[slot] = b->held[slot] = false;
+    load_frame(b, f, f->number, &f->error);
+    if (rl_reader_missed(f->error.code)) {
+        miss_frame(b, f, slot);
+    } else if (!f->error.code) {
+        b->has_good = true;
+        b->good = f->number;
     }
     f->load_s = now_s() - start;
 }
@@ -188,10 +220,10 @@ static void batch_run(void *ctx, size_t item, int slot)
     batch_state *b = ctx;
     rl_frame *f = &b->frames[slot];
     double start = now_s();
-    bool cut = f->error.code || is_cut(b, f);
+    bool cut = f->error.code || b->held[slot] || is_cut(b, f);
     if (!f->error.code)
         rl_session_execute(b->s, b->q, f, cut, &f->error);
-    b->history = !f->error.code;
+    b->history = !f->error.code && !b->held[slot]; /* a held frame is no past of the next one */
     b->previous = f->number;
     b->camera = f->camera;
     f->run_s = now_s() - start;
@@ -362,6 +394,7 @@ rl_code rl_session_image(rl_session *s, const char *image, rl_image_view *out, r
     rl_code code = rl_session_map_image(q, &s->frame, buffer, &view, &memory, err);
     if (code)
         return code;
+    restore_ids(&s->frame, image, &view);
     *out = (rl_image_view){.x = s->frame.geometry.x,
                            .y = s->frame.geometry.y,
                            .width = s->frame.geometry.width,
