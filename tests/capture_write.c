@@ -41,7 +41,8 @@ static int channels_of(const capture_form *f, int layer)
     return layer == 1 && f->normal == NORMAL_OCTAHEDRAL ? 2 : layers[layer].n;
 }
 
-/* ---- from the scene to the file's numbers -------------------------------------------------------------------- */
+/* ---- from the scene to the file's numbers
+ * -------------------------------------------------------------------- */
 
 static void encode_normal(const capture_form *f, const scene *s, const double *n, double *out)
 {
@@ -100,8 +101,9 @@ static void encode_pixel(const capture_form *f, const scene *s, int layer, size_
         out[0] = s->id[i] ? encode_depth(f, in[0], s->plane[SCENE_RAY][i]) : f->empty;
         break;
     case 3:
-        out[0] = f->ids ? f->stencil == RL_EXR_UINT ? (double)f->ids[s->id[i]] : (double)(int32_t)f->ids[s->id[i]]
-                        : (double)s->id[i];
+        out[0] =
+            f->ids ? f->stencil == RL_EXR_UINT ? (double)f->ids[s->id[i]] : (double)(int32_t)f->ids[s->id[i]]
+                   : (double)s->id[i];
         break;
     case 4:
         out[0] = in[0] / metres(f);
@@ -116,7 +118,8 @@ static void encode_pixel(const capture_form *f, const scene *s, int layer, size_
     }
 }
 
-/* ---- to the file's types --------------------------------------------------------------------------------------- */
+/* ---- to the file's types
+ * --------------------------------------------------------------------------------------- */
 
 static rl_exr_pixel type_of(const capture_form *f, int layer)
 {
@@ -198,7 +201,8 @@ static void release(drawn *d)
     d->n = 0;
 }
 
-/* ---- files ------------------------------------------------------------------------------------------------------- */
+/* ---- files
+ * ------------------------------------------------------------------------------------------------------- */
 
 /* World to camera in the file's convention and unit, rows listed, column vectors. */
 static void file_matrix(const capture_form *f, const scene_camera *c, double m[16])
@@ -209,7 +213,8 @@ static void file_matrix(const capture_form *f, const scene_camera *c, double m[1
     m[15] = 1;
 }
 
-static void fill_header(const capture_form *f, const scene_camera *c, float matrix[16], float jitter[2], made_header *h)
+static void fill_header(const capture_form *f, const scene_camera *c, float matrix[16], float jitter[2],
+                        made_header *h)
 {
     double m[16];
     file_matrix(f, c, m);
@@ -259,7 +264,8 @@ void capture_write(const char *folder, const capture_form *f, const scene *s, in
         release(&d[i]);
 }
 
-/* ---- the manifest -------------------------------------------------------------------------------------------------- */
+/* ---- the manifest
+ * -------------------------------------------------------------------------------------------------- */
 
 static void print_numbers(rl_str *y, const double *v, int n)
 {
@@ -271,7 +277,9 @@ static void print_numbers(rl_str *y, const double *v, int n)
 static void print_camera(rl_str *y, const capture_form *f, const scene *s, int n)
 {
     rl_str_printf(y, "camera:\n  forward: %s\n  matrix: %s", f->forward_z ? "+z" : "-z",
-                  f->camera == CAMERA_HEADER ? "header" : f->camera == CAMERA_LIST ? "[" : "");
+                  f->camera == CAMERA_HEADER ? "header"
+                  : f->camera == CAMERA_LIST ? "["
+                                             : "");
     for (int i = 0; i < (f->camera == CAMERA_HEADER ? 0 : f->camera == CAMERA_LIST ? n : 1); i++) {
         double m[16];
         file_matrix(f, &s[i].camera, m);
@@ -279,7 +287,9 @@ static void print_camera(rl_str *y, const capture_form *f, const scene *s, int n
         print_numbers(y, m, 16);
     }
     rl_str_printf(y, "%s\n  fov_x: %s", f->camera == CAMERA_LIST ? "]" : "",
-                  f->fov <= FOV_WINDOW ? "header" : f->fov == FOV_LIST ? "[" : "");
+                  f->fov <= FOV_WINDOW ? "header"
+                  : f->fov == FOV_LIST ? "["
+                                       : "");
     for (int i = 0; i < (f->fov == FOV_LIST ? n : f->fov == FOV_MANIFEST); i++)
         rl_str_printf(y, "%s%.17g", i ? ", " : "", s[i].camera.fov_x * 180 / 3.14159265358979323846);
     rl_str_printf(y, "%s\n  jitter: ", f->fov == FOV_LIST ? "]" : "");
@@ -292,22 +302,25 @@ static void print_camera(rl_str *y, const capture_form *f, const scene *s, int n
 
 static void print_keys(rl_str *y, const capture_form *f, int layer)
 {
-    static const char *const encodings[] = {"signed", "unsigned", "octahedral"}, *const kinds[] = {"planar", "radial", "device"},
+    static const char *const encodings[] = {"signed", "unsigned", "octahedral"},
+                             *const kinds[] = {"planar", "radial", "device"},
                              *const units[] = {"pixels", "uv", "ndc"};
     switch (layer) {
     case 0:
         rl_str_printf(y, ", colorspace: %s", f->colorspace ? f->colorspace : "lin_rec709");
         break;
     case 1:
-        rl_str_printf(y, ", space: %s, encoding: %s", f->normal_camera ? "camera" : "world", encodings[f->normal]);
+        rl_str_printf(y, ", space: %s, encoding: %s", f->normal_camera ? "camera" : "world",
+                      encodings[f->normal]);
         break;
     case 2:
         rl_str_printf(y, ", kind: %s", kinds[f->depth]);
         if (f->depth == DEPTH_DEVICE && isinf(f->far))
-            rl_str_printf(y, ", near: %.17g, far: .inf, reversed: %s", f->near / metres(f), f->reversed ? "true" : "false");
-        else if (f->depth == DEPTH_DEVICE)
-            rl_str_printf(y, ", near: %.17g, far: %.17g, reversed: %s", f->near / metres(f), f->far / metres(f),
+            rl_str_printf(y, ", near: %.17g, far: .inf, reversed: %s", f->near / metres(f),
                           f->reversed ? "true" : "false");
+        else if (f->depth == DEPTH_DEVICE)
+            rl_str_printf(y, ", near: %.17g, far: %.17g, reversed: %s", f->near / metres(f),
+                          f->far / metres(f), f->reversed ? "true" : "false");
         if (f->empty_key)
             rl_str_printf(y, ", empty: %s", f->empty_key);
         break;
@@ -318,8 +331,8 @@ static void print_keys(rl_str *y, const capture_form *f, int layer)
         }
         break;
     case 5:
-        rl_str_printf(y, ", unit: %s, points: %s, y: %s", units[f->motion], f->motion_next ? "next" : "previous",
-                      f->motion_up ? "up" : "down");
+        rl_str_printf(y, ", unit: %s, points: %s, y: %s", units[f->motion],
+                      f->motion_next ? "next" : "previous", f->motion_up ? "up" : "down");
         break;
     default:
         break;
@@ -334,9 +347,11 @@ static void print_layers(rl_str *y, const capture_form *f)
             continue;
         if (i == 6)
             rl_str_add(y, "  shadow:\n");
-        rl_str_printf(y, i < 6 ? "  %s: {channels: [" : "    %.3s: {channels: [", layers[i].name + (i < 6 ? 0 : 7));
+        rl_str_printf(y, i < 6 ? "  %s: {channels: [" : "    %.3s: {channels: [",
+                      layers[i].name + (i < 6 ? 0 : 7));
         for (int c = 0; c < channels_of(f, i); c++)
-            rl_str_printf(y, "%s\"%s\"", c ? ", " : "", f->files == FILES_ONE ? layers[i].full[c] : layers[i].bare[c]);
+            rl_str_printf(y, "%s\"%s\"", c ? ", " : "",
+                          f->files == FILES_ONE ? layers[i].full[c] : layers[i].bare[c]);
         rl_str_add(y, "]");
         print_keys(y, f, i);
         if (f->files == FILES_PARTS)
@@ -391,13 +406,15 @@ static void print_lights(rl_str *y, const capture_form *f)
 void capture_manifest(const char *folder, const capture_form *f, const scene *s, int n)
 {
     rl_str y = {0};
-    rl_str_printf(&y, "relit_capture: 1\nname: %s\nunit: %s\n", f->title ? f->title : "cap", f->unit ? f->unit : "m");
+    rl_str_printf(&y, "relit_capture: 1\nname: %s\nunit: %s\n", f->title ? f->title : "cap",
+                  f->unit ? f->unit : "m");
     print_files(&y, f);
     print_camera(&y, f, s, n);
     print_layers(&y, f);
     print_lights(&y, f);
     rl_str_printf(&y, f->frames ? "frames: %s\n" : "%s", f->frames ? f->frames : "");
-    rl_str_printf(&y, f->stencil_names ? "stencil_names: %s\n" : "%s", f->stencil_names ? f->stencil_names : "");
+    rl_str_printf(&y, f->stencil_names ? "stencil_names: %s\n" : "%s",
+                  f->stencil_names ? f->stencil_names : "");
     rl_str_add(&y, f->extra ? f->extra : "");
     assert_false(y.failed);
     file_write(folder, "capture.yaml", y.text, y.length);

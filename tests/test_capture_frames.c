@@ -1,4 +1,5 @@
-/* Sequences: frames that are missing, broken, of another size, of several captures; what is counted and what is refused. */
+/* Sequences: frames that are missing, broken, of another size, of several captures; what is counted and what
+ * is refused. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -121,7 +122,8 @@ static double off(const char *folder, const char *name, const scene *truth)
     return worst / most;
 }
 
-/* ---- cameras and frames ---------------------------------------------------------------------------------------------- */
+/* ---- cameras and frames
+ * ---------------------------------------------------------------------------------------------- */
 
 static void test_a_camera_a_frame(void **state)
 {
@@ -158,7 +160,8 @@ static void expect_wrong(const rl_options *options, const char *text)
 
 static void expect_refused(const char *folder, const char *frames, const char *text)
 {
-    rl_options options = {.pipeline_text = capture_pipeline, .captures = &folder, .n_captures = 1, .frames = frames};
+    rl_options options = {
+        .pipeline_text = capture_pipeline, .captures = &folder, .n_captures = 1, .frames = frames};
     expect_wrong(&options, text);
 }
 
@@ -179,7 +182,8 @@ static void test_frames_option(void **state)
     leave(folder, s, 3);
 }
 
-/* ---- missing and broken ------------------------------------------------------------------------------------------------ */
+/* ---- missing and broken
+ * ------------------------------------------------------------------------------------------------ */
 
 static void cut_file(const char *folder, int frame)
 {
@@ -258,12 +262,14 @@ static void test_cuts(void **state)
         assert_true(off(out_of(folder), "cap.0004.exr", &s[3]) > 1e-4);
     }
     assert_true(off(out_of(folder), "cap.0002.exr", &s[0]) < 2e-6); /* the held one */
-    run(folder, with_taa, (rl_options){.frames = "1,3-4"}, &o); /* a gap in what is processed */
+    run(folder, with_taa, (rl_options){.frames = "1,3-4"}, &o);     /* a gap in what is processed */
     assert_true(off(out_of(folder), "cap.0003.exr", &s[2]) < 2e-6);
     leave(folder, s, 4);
 }
 
-/* ---- sizes ----------------------------------------------------------------------------------------------------------------- */
+/* ---- sizes
+ * -----------------------------------------------------------------------------------------------------------------
+ */
 
 static void test_sizes_in_a_sequence(void **state)
 {
@@ -332,14 +338,16 @@ static void test_sizes_in_a_frame(void **state)
     assert_int_equal(rename(from, to), 0);
     run(folder, capture_pipeline, (rl_options){0}, &o);
     assert_int_equal(o.summary.failed, 1);
-    assert_non_null(strstr(o.text[2], "albedo.0002.exr: layer 'albedo' has the data window (0, 0) - (39, 47)"));
+    assert_non_null(
+        strstr(o.text[2], "albedo.0002.exr: layer 'albedo' has the data window (0, 0) - (39, 47)"));
     assert_true(off(out_of(folder), "cap.0003.exr", &s[2]) < 2e-6);
     scene_free(&narrow);
     folder_remove(other);
     leave(folder, s, 3);
 }
 
-/* ---- what is counted, what is refused ---------------------------------------------------------------------------------- */
+/* ---- what is counted, what is refused
+ * ---------------------------------------------------------------------------------- */
 
 static void spoil(const char *layer, double **c, int n, size_t pixels)
 {
@@ -418,15 +426,20 @@ static void test_ids_refused(void **state)
     leave(folder, s, 1);
 }
 
-/* ---- several captures ------------------------------------------------------------------------------------------------------ */
+/* ---- several captures
+ * ------------------------------------------------------------------------------------------------------ */
 
 static void test_two_captures(void **state)
 {
     (void)state;
     scene a[2], b[2];
     outcome o;
-    capture_form first = {.name = "one"}, second = {.name = "two", .title = "other", .forward_z = true, .unit = "cm",
-                                                    .metres = 0.01, .files = FILES_PARTS};
+    capture_form first = {.name = "one"}, second = {.name = "two",
+                                                    .title = "other",
+                                                    .forward_z = true,
+                                                    .unit = "cm",
+                                                    .metres = 0.01,
+                                                    .files = FILES_PARTS};
     char *one = make_frames(&first, a, 2), *two = make_frames(&second, b, 2), *out = folder_new();
     const char *both[] = {one, two}, *twice[] = {one, one};
     run(one, with_taa, (rl_options){.captures = both, .n_captures = 2, .out = out}, &o);
@@ -447,11 +460,14 @@ static void test_two_captures(void **state)
     free(still);
     const char *dump[] = {"c.color"};
     char *same = text_replace(capture_pipeline, "{capture}.{frame", "{capture}.c.color.{frame");
-    options = (rl_options){.pipeline_text = same, .captures = both, .n_captures = 1, .dump = dump, .n_dump = 1};
+    options =
+        (rl_options){.pipeline_text = same, .captures = both, .n_captures = 1, .dump = dump, .n_dump = 1};
     expect_wrong(&options, "would both write 'cap.c.color.0001.exr'");
     free(same);
     options = (rl_options){.pipeline_text = capture_pipeline, .captures = both, .n_captures = 2, .out = one};
-    expect_wrong(&options, "is read as frame 1 of capture 'cap' and would be written over"); /* the capture's own files */
+    expect_wrong(
+        &options,
+        "is read as frame 1 of capture 'cap' and would be written over"); /* the capture's own files */
     folder_remove(out);
     leave(one, a, 2);
     leave(two, b, 2);
