@@ -16,20 +16,25 @@
 
 enum { MOST = 3, LAYERS = 8 };
 
-static const struct {
+typedef struct layer_names {
     const char *name;
     int plane, n;
-    const char *full[MOST], *bare[MOST]; /* channels where layers share a file, and where each has its own */
-} layers[LAYERS] = {
-    {"albedo", SCENE_ALBEDO, 3, {"albedo.R", "albedo.G", "albedo.B"}, {"R", "G", "B"}},
-    {"normal", SCENE_NORMAL, 3, {"normal.X", "normal.Y", "normal.Z"}, {"X", "Y", "Z"}},
-    {"depth", SCENE_DEPTH, 1, {"depth.Z"}, {"Z"}},
-    {"stencil", -1, 1, {"stencil.ID"}, {"ID"}},
-    {"thickness", SCENE_THICKNESS, 1, {"thickness.T"}, {"T"}},
-    {"motion", SCENE_MOTION, 2, {"motion.X", "motion.Y"}, {"X", "Y"}},
-    {"shadow.key", SCENE_SHADOW, 1, {"shadow.key"}, {"V"}},
-    {"shadow.rim", SCENE_SHADOW + 1, 1, {"shadow.rim"}, {"V"}},
+    /* Channels where layers share a file, where each has its own, and as Blender's Cycles names them. */
+    const char *full[MOST], *bare[MOST], *blender[MOST];
+} layer_names;
+
+#define V "ViewLayer."
+static const layer_names layers[LAYERS] = {
+    {"albedo", SCENE_ALBEDO, 3, {"albedo.R", "albedo.G", "albedo.B"}, {"R", "G", "B"}, {V "DiffCol.R", V "DiffCol.G", V "DiffCol.B"}},
+    {"normal", SCENE_NORMAL, 3, {"normal.X", "normal.Y", "normal.Z"}, {"X", "Y", "Z"}, {V "Normal.X", V "Normal.Y", V "Normal.Z"}},
+    {"depth", SCENE_DEPTH, 1, {"depth.Z"}, {"Z"}, {V "Depth.Z"}},
+    {"stencil", -1, 1, {"stencil.ID"}, {"ID"}, {V "IndexMA.X"}},
+    {"thickness", SCENE_THICKNESS, 1, {"thickness.T"}, {"T"}, {0}},
+    {"motion", SCENE_MOTION, 2, {"motion.X", "motion.Y"}, {"X", "Y"}, {V "Vector.X", V "Vector.Y"}},
+    {"shadow.key", SCENE_SHADOW, 1, {"shadow.key"}, {"V"}, {0}},
+    {"shadow.rim", SCENE_SHADOW + 1, 1, {"shadow.rim"}, {"V"}, {0}},
 };
+#undef V
 
 static double metres(const capture_form *f)
 {
@@ -153,7 +158,10 @@ typedef struct drawn {
 static void draw(const capture_form *f, const scene *s, int layer, bool bare, drawn *d)
 {
     int n = channels_of(f, layer);
+    const char *const *names = f->blender ? layers[layer].blender : bare ? layers[layer].bare : layers[layer].full;
     double *plane[MOST];
+    if (!names[0])
+        return;
     for (int c = 0; c < MOST; c++)
         plane[c] = calloc(s->n, sizeof **plane);
     for (size_t i = 0; i < s->n; i++) {
@@ -166,7 +174,7 @@ static void draw(const capture_form *f, const scene *s, int layer, bool bare, dr
         f->spoil(layers[layer].name, plane, n, s->n);
     for (int c = 0; c < n; c++, d->n++) {
         rl_exr_pixel type = type_of(f, layer);
-        d->channel[d->n] = (made_channel){.name = bare ? layers[layer].bare[c] : layers[layer].full[c],
+        d->channel[d->n] = (made_channel){.name = names[c],
                                           .type = type,
                                           .pixels = narrow(plane[c], s->n, type)};
     }

@@ -293,32 +293,56 @@ static void test_bare(void **state)
     free(pipeline);
 }
 
+/* A session on a capture written in the pipeline; processes frame 2 and compares; frees the scene. */
+static void expect_inline(const char *lines, scene s)
+{
+    static const char *const images[] = {"c.color", "capture.motion"};
+    char *pipeline = with(lines);
+    rl_options options = {.pipeline_text = pipeline, .dump = images, .n_dump = 2};
+    rl_session *r = NULL;
+    rl_error err = {0};
+    if (rl_session_open(&options, &r, &err) || rl_session_process(r, 0, 2, NULL, &err))
+        fail_msg("%s:%d: %s", err.file, err.line, err.text);
+    rl_image_view color = capture_image(r, "c.color"), motion = capture_image(r, "capture.motion");
+    assert_true(capture_error(&color, &s, SCENE_COLOR, 3, 0) <= 4e-6);
+    assert_true(capture_error(&motion, &s, SCENE_MOTION, 2, 0) <= 1e-6);
+    rl_session_close(&r);
+    scene_free(&s);
+    free(pipeline);
+}
+
+#define DEGREES "45.8366236105"
+
 /* As DESIGN 3 has it: a preset, and what it leaves open. */
 static void test_preset_inline(void **state)
 {
     (void)state;
     rl_str lines = {0};
-    rl_str_printf(
-        &lines,
-        "capture: {files: \"%s/cap.####.exr\", preset: relit, name: cap, fps: 25, camera: {fov_x: %.12g}}\n",
-        folder, 0.8 * 180 / 3.14159265358979323846);
+    rl_str_printf(&lines,
+                  "capture: {files: \"%s/cap.####.exr\", preset: relit, name: cap, fps: 25, camera: {fov_x: " DEGREES "}}\n",
+                  folder);
     rl_str_add(&lines, ALL_LIGHTS);
-    char *pipeline = with(lines.text);
-    rl_options options = {.pipeline_text = pipeline};
-    const char *color[] = {"c.color"};
-    options.dump = color;
-    options.n_dump = 1;
-    rl_session *r = NULL;
-    rl_error err = {0};
-    if (rl_session_open(&options, &r, &err) || rl_session_process(r, 0, 2, NULL, &err))
-        fail_msg("%s:%d: %s", err.file, err.line, err.text);
-    scene s = truth(SCENE_LIGHTS, 3);
-    rl_image_view view = capture_image(r, "c.color");
-    assert_true(capture_error(&view, &s, SCENE_COLOR, 3, 0) <= 4e-6);
-    rl_session_close(&r);
-    scene_free(&s);
+    expect_inline(lines.text, truth(SCENE_LIGHTS, 3));
     rl_str_free(&lines);
-    free(pipeline);
+}
+
+static void test_preset_blender(void **state)
+{
+    (void)state;
+    static const capture_form blender = {
+        .name = "blender", .blender = true, .stencil = RL_EXR_FLOAT, .empty = 1e10, .motion_up = true, .camera = CAMERA_MANIFEST};
+    scene s = truth(SCENE_LIGHTS, 0);
+    const double *v = s.camera.view;
+    rl_str lines = {0};
+    char *own = folder_new();
+    capture_write(own, &blender, &s, 2);
+    rl_str_printf(&lines, "capture: {files: %s/cap.%%04d.exr, preset: blender, camera: {fov_x: " DEGREES ", matrix: [", own);
+    for (int i = 0; i < 12; i++)
+        rl_str_printf(&lines, "%.12g, ", v[i]);
+    rl_str_add(&lines, "0, 0, 0, 1]}}\n" ALL_LIGHTS);
+    expect_inline(lines.text, s);
+    rl_str_free(&lines);
+    folder_remove(own);
 }
 
 static void test_memory_without_name(void **state)
@@ -346,6 +370,7 @@ int main(void)
         cmocka_unit_test(test_working_space),
         cmocka_unit_test(test_bare),
         cmocka_unit_test(test_preset_inline),
+        cmocka_unit_test(test_preset_blender),
         cmocka_unit_test(test_memory_without_name),
     };
     return cmocka_run_group_tests(tests, setup, teardown);
