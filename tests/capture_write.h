@@ -45,7 +45,7 @@ typedef struct capture_form {
     const char *stencil_names, *frames, *extra; /* further lines of the manifest, or NULL */
     const char *shadows;                        /* NULL: {key: …, rim: …} by their names */
     const char *lights;                         /* NULL: the scene's */
-    bool blender;             /* names of Cycles' passes; FILES_ONE */
+    bool blender;                               /* names of Cycles' passes; FILES_ONE */
     bool no_lights, no_matrix;                  /* the header's matrix is left out */
     const uint32_t *time_code;
     int fps[2];

@@ -81,9 +81,7 @@ static void expect_lights(const char *lights, scene s)
     free(pipeline);
 }
 
-/* ---- units
- * ----------------------------------------------------------------------------------------------------------
- */
+/* ---- units ---- */
 
 static void test_photometric(void **state)
 {
@@ -106,8 +104,7 @@ static void test_photometric(void **state)
         truth(SCENE_KEY, SCENE_KEY));
 }
 
-/* ---- shadows
- * -------------------------------------------------------------------------------------------------------- */
+/* ---- shadows ---- */
 
 #define KEY "type: point, position: [0.6, 1.2, -0.4], intensity: [3, 2, 1]"
 #define RIM                                                                                                  \
@@ -170,8 +167,7 @@ static void test_renamed_layers(void **state)
     folder_remove(own);
 }
 
-/* ---- camera space
- * ------------------------------------------------------------------------------------------------------ */
+/* ---- camera space ---- */
 
 static void test_camera_space(void **state)
 {
@@ -194,8 +190,7 @@ static void test_camera_space(void **state)
     expect_lights(lights, truth(SCENE_KEY | SCENE_SUN, SCENE_KEY));
 }
 
-/* ---- working space
- * ------------------------------------------------------------------------------------------------------ */
+/* ---- working space ---- */
 
 /* Linear Rec.709 to AP1 by Bradford's adaptation (S-2014-004 and ITU-R BT.709, ten digits). */
 static const double to_ap1[9] = {0.6130974024, 0.3395231462, 0.0473794514, 0.0701937225, 0.9163538791,
@@ -266,8 +261,7 @@ static void test_working_space(void **state)
     free(same);
 }
 
-/* ---- without a manifest, and with half of one
- * ------------------------------------------------------------------------ */
+/* ---- without a manifest, and with half of one ---- */
 
 #define SUN        "type: directional, direction: [-0.3, -0.9, -0.4], irradiance: [0.4, 0.3, 0.2]"
 #define ALL_LIGHTS "lights: {key: {" KEY "}, rim: {" RIM "}, sun: {" SUN "}}\n"
@@ -318,9 +312,11 @@ static void test_preset_inline(void **state)
 {
     (void)state;
     rl_str lines = {0};
-    rl_str_printf(&lines,
-                  "capture: {files: \"%s/cap.####.exr\", preset: relit, name: cap, fps: 25, camera: {fov_x: " DEGREES "}}\n",
-                  folder);
+    rl_str_printf(
+        &lines,
+        "capture: {files: \"%s/cap.####.exr\", preset: relit, name: cap, fps: 25, camera: {fov_x: " DEGREES
+        "}}\n",
+        folder);
     rl_str_add(&lines, ALL_LIGHTS);
     expect_inline(lines.text, truth(SCENE_LIGHTS, 3));
     rl_str_free(&lines);
@@ -329,14 +325,20 @@ static void test_preset_inline(void **state)
 static void test_preset_blender(void **state)
 {
     (void)state;
-    static const capture_form blender = {
-        .name = "blender", .blender = true, .stencil = RL_EXR_FLOAT, .empty = 1e10, .motion_up = true, .camera = CAMERA_MANIFEST};
+    static const capture_form blender = {.name = "blender",
+                                         .blender = true,
+                                         .stencil = RL_EXR_FLOAT,
+                                         .empty = 1e10,
+                                         .motion_up = true,
+                                         .camera = CAMERA_MANIFEST};
     scene s = truth(SCENE_LIGHTS, 0);
     const double *v = s.camera.view;
     rl_str lines = {0};
     char *own = folder_new();
     capture_write(own, &blender, &s, 2);
-    rl_str_printf(&lines, "capture: {files: %s/cap.%%04d.exr, preset: blender, camera: {fov_x: " DEGREES ", matrix: [", own);
+    rl_str_printf(
+        &lines, "capture: {files: %s/cap.%%04d.exr, preset: blender, camera: {fov_x: " DEGREES ", matrix: [",
+        own);
     for (int i = 0; i < 12; i++)
         rl_str_printf(&lines, "%.12g, ", v[i]);
     rl_str_add(&lines, "0, 0, 0, 1]}}\n" ALL_LIGHTS);
@@ -362,16 +364,11 @@ static void test_memory_without_name(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_photometric),
-        cmocka_unit_test(test_shadows),
-        cmocka_unit_test(test_no_such_shadow),
-        cmocka_unit_test(test_renamed_layers),
-        cmocka_unit_test(test_camera_space),
-        cmocka_unit_test(test_working_space),
-        cmocka_unit_test(test_bare),
-        cmocka_unit_test(test_preset_inline),
-        cmocka_unit_test(test_preset_blender),
-        cmocka_unit_test(test_memory_without_name),
+        cmocka_unit_test(test_photometric),    cmocka_unit_test(test_shadows),
+        cmocka_unit_test(test_no_such_shadow), cmocka_unit_test(test_renamed_layers),
+        cmocka_unit_test(test_camera_space),   cmocka_unit_test(test_working_space),
+        cmocka_unit_test(test_bare),           cmocka_unit_test(test_preset_inline),
+        cmocka_unit_test(test_preset_blender), cmocka_unit_test(test_memory_without_name),
     };
     return cmocka_run_group_tests(tests, setup, teardown);
 }

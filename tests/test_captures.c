@@ -90,8 +90,7 @@ static void expect_default(const capture_form *f, allowed most)
     expect_scene(f, &camera, most);
 }
 
-/* ---- channels, chunks, files
- * ------------------------------------------------------------------------------------ */
+/* ---- channels, chunks, files ---- */
 
 static void test_storage(void **state)
 {
@@ -137,8 +136,7 @@ static void test_windows(void **state)
     }
 }
 
-/* ---- depth and units
- * ---------------------------------------------------------------------------------------------- */
+/* ---- depth and units ---- */
 
 static void test_depth(void **state)
 {
@@ -202,8 +200,7 @@ static void test_units(void **state)
         expect_default(&forms[i], full);
 }
 
-/* ---- normals and cameras
- * ------------------------------------------------------------------------------------------ */
+/* ---- normals and cameras ---- */
 
 static void test_normals(void **state)
 {
@@ -259,8 +256,7 @@ static void test_cameras(void **state)
     }
 }
 
-/* ---- motion, ids, colours
- * ------------------------------------------------------------------------------------------ */
+/* ---- motion, ids, colours ---- */
 
 static void test_motion(void **state)
 {
