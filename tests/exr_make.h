@@ -36,9 +36,9 @@ typedef struct made_part {
     int tile;    /* side of a tile; 0 = scanlines */
     bool mipmap; /* all levels; those above 0 hold zeros */
     bool deep;   /* header only */
-    const made_header *header; /* may be NULL */
     const made_channel *channels;
     int n_channels;
+    const made_header *header; /* may be NULL */
 } made_part;
 
 /* Fails the running test when the core refuses. */

@@ -24,7 +24,6 @@ enum { RL_MOST_FILES = 32 }; /* patterns of one capture */
 typedef struct rl_frame {
     int number;                /* under which it is processed */
     rl_geometry geometry;
-    rl_geometry fitted;        /* what the buffers were made for */
     rl_exr_box data_window, display_window;
     camera_t camera;
     rl_frame_buffers *buffers; /* of this geometry */

@@ -63,6 +63,8 @@ static rl_code find_preset(rl_session *s, const char *files, const char *presets
 
 static rl_code load_manifest(rl_session *s, const char *path, rl_sequence *q, rl_error *err)
 {
+    if (!path)
+        return rl_fail_memory(err, 1);
     const char *presets = rl_data_path(&s->arena, "presets");
     if (rl_path_is_folder(path) || is_yaml(path))
         return rl_manifest_load(&s->arena, path, presets, s->log, &q->manifest, err);

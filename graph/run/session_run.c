@@ -8,7 +8,7 @@
 #include "graph/run/camera.h"
 #include "graph/run/session.h"
 
-enum { MOST_IN_FLIGHT = 3, MOST_OUTPUT_FILES = 64 };
+enum { MOST_IN_FLIGHT = 3 };
 
 static double now_s(void)
 {
@@ -20,10 +20,9 @@ static double now_s(void)
 /* Buffers follow the size of the frame that they hold. */
 static rl_code fit_buffers(rl_sequence *q, rl_frame *f, rl_error *err)
 {
-    if (f->buffers && !memcmp(&f->fitted, &f->geometry, sizeof f->fitted))
+    if (f->buffers && !memcmp(rl_frame_buffers_geometry(f->buffers), &f->geometry, sizeof f->geometry))
         return RL_OK;
     rl_frame_buffers_free(&f->buffers);
-    f->fitted = f->geometry;
     return rl_frame_buffers_new(q->executor, &f->geometry, &f->buffers, err);
 }
 
@@ -67,9 +66,8 @@ rl_code rl_session_map_image(const rl_sequence *q, const rl_frame *f, int buffer
 }
 
 typedef struct writing {
-    rl_sink_image images[MOST_OUTPUT_FILES];
-    rl_memory *memory[MOST_OUTPUT_FILES];
-    size_t n;
+    rl_sink_image *images;
+    rl_memory **memory; /* mapped, or NULL */
 } writing;
 
 /* The stencil goes out as the ids of the capture, not as dense indices. */
@@ -82,21 +80,23 @@ static void restore_ids(const rl_frame *f, const char *name, rl_sink_image *imag
 }
 
 static rl_code write_output(rl_session *s, rl_sequence *q, rl_frame *f, size_t output, const rl_sink_frame *frame,
-                            const char *path, rl_error *err)
+                            const char *path, rl_arena *arena, rl_error *err)
 {
     const rl_wanted *w = &s->wanted[output];
-    writing wr = {0};
+    writing wr = {.images = rl_arena_array(arena, w->n_layers, sizeof *wr.images),
+                  .memory = rl_arena_array(arena, w->n_layers, sizeof(rl_memory *))};
+    if (!wr.images || !wr.memory)
+        return rl_fail_memory(err, w->n_layers * sizeof *wr.images);
     rl_code code = RL_OK;
-    for (size_t i = 0; i < w->n_layers && i < MOST_OUTPUT_FILES && !code; i++) {
+    for (size_t i = 0; i < w->n_layers && !code; i++) {
         code = rl_session_map_image(q, f, q->plan->outputs[output][i], &wr.images[i], &wr.memory[i], err);
         wr.images[i].name = w->layers[i].name;
         if (!code)
             restore_ids(f, w->layers[i].image, &wr.images[i]);
-        wr.n = i + 1;
     }
     if (!code)
-        code = rl_sink_write(path, &s->outputs[output], wr.images, wr.n, frame, s->pool, &f->clipped, err);
-    for (size_t i = 0; i < wr.n; i++) {
+        code = rl_sink_write(path, &s->outputs[output], wr.images, w->n_layers, frame, s->pool, &f->clipped, err);
+    for (size_t i = 0; i < w->n_layers; i++) {
         rl_code unmapped = wr.memory[i] ? rl_memory_unmap(wr.memory[i], code ? NULL : err) : RL_OK;
         code = code ? code : unmapped;
     }
@@ -106,6 +106,9 @@ static rl_code write_output(rl_session *s, rl_sequence *q, rl_frame *f, size_t o
 static rl_code write_frame(rl_session *s, rl_sequence *q, rl_frame *f, rl_arena *arena, const char **files,
                            size_t *n_files, rl_error *err)
 {
+    const char *pipeline = rl_arena_printf(arena, "%s %016llx", s->pipeline->name, s->pipeline->hash);
+    if (!pipeline || !files)
+        return rl_fail_memory(err, s->n_outputs * sizeof *files);
     rl_sink_image stencil = {0};
     rl_memory *memory = NULL;
     rl_code code = rl_session_map_image(q, f, q->plan->outputs[s->n_outputs][1], &stencil, &memory, err);
@@ -117,7 +120,7 @@ static rl_code write_frame(rl_session *s, rl_sequence *q, rl_frame *f, rl_arena 
                            .source = f->files[f->main_file],
                            .source_part = f->main_part,
                            .fps = q->manifest->fps,
-                           .pipeline = rl_arena_printf(arena, "%s %016llx", s->pipeline->name, s->pipeline->hash)};
+                           .pipeline = pipeline};
     for (size_t i = 0; i < s->n_outputs && !code; i++) {
         const char *name = NULL;
         code = rl_output_path(arena, s->outputs[i].spec, q->manifest->name, f->number, NULL, &name, err);
@@ -125,8 +128,8 @@ static rl_code write_frame(rl_session *s, rl_sequence *q, rl_frame *f, rl_arena 
         if (!code && !path)
             code = rl_fail_memory(err, 1);
         if (!code)
-            code = write_output(s, q, f, i, &frame, path, err);
-        if (!code && *n_files < MOST_OUTPUT_FILES)
+            code = write_output(s, q, f, i, &frame, path, arena, err);
+        if (!code)
             files[(*n_files)++] = path;
     }
     if (memory)
@@ -189,7 +192,7 @@ static void batch_load(void *ctx, size_t item, int slot)
     f->number = b->q->frames.numbers[item];
     f->error = (rl_error){0};
     f->run_s = f->write_s = 0;
-    f->clipped = 0;
+    f->nonfinite = f->clamped = f->clipped = 0;
     b->skipped[slot] = b->held[slot] = false;
     load_frame(b, f, f->number, &f->error);
     if (rl_reader_missed(f->error.code)) {
@@ -231,7 +234,7 @@ static void batch_write(void *ctx, size_t item, int slot)
     batch_state *b = ctx;
     rl_frame *f = &b->frames[slot];
     rl_arena arena = {0};
-    const char *files[MOST_OUTPUT_FILES];
+    const char **files = rl_arena_array(&arena, b->s->n_outputs, sizeof *files);
     size_t n_files = 0;
     double start = now_s();
     if (!f->error.code)
