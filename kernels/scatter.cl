@@ -193,16 +193,23 @@ static inline floatv scatter_n_dot_v(constant frame_t *f, global const float *no
     return -dot * rsqrt(rx * rx + (ry * ry + 1.0f));
 }
 
-/* color = lit + filtered · exit(albedo) · F_out, for RL_W pixels of a row; `filtered` and `stencil` are
- * RL_PHASE4. */
-static inline void scatter_resolve(global const float *filtered, global const float *lit,
-                                   global const float *albedo, global const float *normal,
-                                   global const uint *stencil, global float *color, constant frame_t *f,
-                                   constant material_t *materials)
+static inline floatv scatter_load(int layout, global const float *p, constant frame_t *f, int plane, int x,
+                                  int y)
+{
+    return layout == RL_LINEAR ? rl_load(p + plane * f->plane, rl_index(f, x, y))
+                               : rl_load4(p + plane * f->plane4, f, x, y);
+}
+
+/* color = lit + filtered · exit(albedo) · F_out, for RL_W pixels of a row; `filtered` and `stencil` have the layout
+ * that is given. */
+static inline void scatter_resolve_from(int layout, global const float *filtered, global const float *lit,
+                                        global const float *albedo, global const float *normal,
+                                        global const uint *stencil, global float *color, constant frame_t *f,
+                                        constant material_t *materials)
 {
     int x = RL_W * (int)get_global_id(0), y = get_global_id(1);
     int at = rl_index(f, x, y);
-    intv id = rl_as_intv(rl_load4((global const float *)stencil, f, x, y));
+    intv id = rl_as_intv(scatter_load(layout, (global const float *)stencil, f, 0, x, y));
     intv pre_post = 0, disney = 0, scatters = 0, left = id != 0;
     while (scatter_any(left)) {
         int m = scatter_max_int(id & left);
@@ -224,9 +231,18 @@ static inline void scatter_resolve(global const float *filtered, global const fl
         if (scatter_any(scatters)) {
             floatv a = rl_load(albedo + c * f->plane, at);
             a = rl_select(a, sqrt(a), pre_post);
-            floatv v = rl_load4(filtered + c * f->plane4, f, x, y) * a * out;
+            floatv v = scatter_load(layout, filtered, f, c, x, y) * a * out;
             sum += scatter_keep(v, scatters);
         }
         rl_store(sum, color + c * f->plane, at);
     }
+}
+
+/* The same from RL_PHASE4. */
+static inline void scatter_resolve(global const float *filtered, global const float *lit,
+                                   global const float *albedo, global const float *normal,
+                                   global const uint *stencil, global float *color, constant frame_t *f,
+                                   constant material_t *materials)
+{
+    scatter_resolve_from(RL_PHASE4, filtered, lit, albedo, normal, stencil, color, f, materials);
 }
