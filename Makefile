@@ -48,7 +48,7 @@ TOOL_O  := $(TOOL_C:%.c=$(BUILD)/%.o)
 MAIN_O  := $(BUILD)/graph/tool/relit.o
 TESTS   := $(patsubst tests/%.c,$(BUILD)/tests/%,$(wildcard tests/test_*.c))
 SCRIPTS := $(wildcard tests/test_*.sh)
-HELP_O  := $(patsubst tests/%.c,$(BUILD)/tests/%.o,$(filter-out tests/test_%.c tests/bench_%.c tests/example.c,$(wildcard tests/*.c)))
+HELP_O  := $(patsubst tests/%.c,$(BUILD)/tests/%.o,$(filter-out tests/test_%.c tests/bench_%.c tests/fit_%.c tests/example.c,$(wildcard tests/*.c)))
 
 all: $(BUILD)/relit $(BUILD)/librelit.a $(BUILD)/librelit.so $(BUILD)/relit_oiio.so
 
