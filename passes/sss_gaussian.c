@@ -1,9 +1,9 @@
-/* Subsurface scattering with a mixture of Gaussians: every pixel of the material within 3 sigma of the widest,
- * weighted by its distance in view space.
+/* Subsurface scattering with a mixture of Gaussians: every pixel of the material within 3 sigma of the
+ * widest, weighted by its distance in view space.
  *
- * Helix (D. Lenaerts), "Deferred subsurface scattering using compute shaders", after Jimenez et al. 2009 and d'Eon
- * et al. 2007. Helix blends in both passes of the separable form, which squares the unblurred share; here each
- * Gaussian has two passes of its own and is blended once. */
+ * Helix (D. Lenaerts), "Deferred subsurface scattering using compute shaders", after Jimenez et al. 2009 and
+ * d'Eon et al. 2007. Helix blends in both passes of the separable form, which squares the unblurred share;
+ * here each Gaussian has two passes of its own and is blended once. */
 #include "passes/shading_rows.h"
 
 typedef struct sss_gaussian_params {

@@ -4,12 +4,12 @@
  *
  * prints the `gaussians:` of a profile with these d (mm; red, green, blue) and how well they fit.
  *
- * What is fitted is the light at each distance, f(r) = 2 pi r R(r), whose integral is 1: a Gaussian of variance v
- * gives g(r) = r/v e^{-r²/2v}. Minimized is the integral of (sum w g - f)² dr over all three channels, each in units
- * of its own d, as all channels share the four variances. The weights add up to 1: left free they would leave
- * out a seventh of the light, for a gain of a tenth of the error. For given variances the best ones that are not
- * negative come from active sets (four unknowns: all fifteen are tried) and a Lagrange multiplier. The variances are
- * found by Nelder and Mead's simplex in their logarithms. */
+ * What is fitted is the light at each distance, f(r) = 2 pi r R(r), whose integral is 1: a Gaussian of
+ * variance v gives g(r) = r/v e^{-r²/2v}. Minimized is the integral of (sum w g - f)² dr over all three
+ * channels, each in units of its own d, as all channels share the four variances. The weights add up to 1:
+ * left free they would leave out a seventh of the light, for a gain of a tenth of the error. For given
+ * variances the best ones that are not negative come from active sets (four unknowns: all fifteen are tried)
+ * and a Lagrange multiplier. The variances are found by Nelder and Mead's simplex in their logarithms. */
 #include <math.h>
 #include <stdbool.h>
 #include <stdio.h>
@@ -68,7 +68,8 @@ static bool solve(size_t n, double a[GAUSSIANS + 1][GAUSSIANS + 2])
     return true;
 }
 
-/* The weights of one set of Gaussians. Returns what it costs, w'Gw - 2 h'w, or infinity when one is negative. */
+/* The weights of one set of Gaussians. Returns what it costs, w'Gw - 2 h'w, or infinity when one is negative.
+ */
 static double try_set(unsigned set, double g[GAUSSIANS][GAUSSIANS], const double *h, double *weight)
 {
     double a[GAUSSIANS + 1][GAUSSIANS + 2] = {{0}}, cost = 0;
@@ -217,7 +218,8 @@ static void sort_logs(double *v)
 /* To four digits; weights are rounded down so that they cannot add up to more than 1. */
 static void print_fit(fit *f, const double *log_variance)
 {
-    printf("    gaussians: # fitted to d: error %.1f, %.1f, %.1f %%; %.1f, %.1f, %.1f %% of the light misplaced\n",
+    printf("    gaussians: # fitted to d: error %.1f, %.1f, %.1f %%; %.1f, %.1f, %.1f %% of the light "
+           "misplaced\n",
            100 * f->error[0], 100 * f->error[1], 100 * f->error[2], 100 * f->moved[0], 100 * f->moved[1],
            100 * f->moved[2]);
     for (size_t k = 0; k < GAUSSIANS; k++) {

@@ -1,4 +1,5 @@
-/* sss_gaussian against plain C in double, and what it promises: shares, variances, energy, borders, detail. */
+/* sss_gaussian against plain C in double, and what it promises: shares, variances, energy, borders, detail.
+ */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -20,11 +21,25 @@ enum { SEPARABLE = 1, FULL = 0 };
 /* Shaded like sss_materials: those resolve. */
 static const gaussian_material mixtures[SSS_MATERIALS] = {
     {0},
-    {1, 3, {0.0516f, 0.2719f, 2.0062f}, {{0.1158f, 0.3661f, 0.3439f}, {0.1836f, 0.1864f, 0}, {0.46f, 0, 0.0402f}}, 0, 0, 0, 0},
     {1,
-     4, {0.362f, 2.144f, 8.555f, 34.833f},
-     {{0.0544f, 0.1245f, 0.2177f}, {0.2436f, 0.2435f, 0.189f}, {0.3105f, 0.3158f, 0.3742f}, {0.3913f, 0.3161f, 0.2189f}},
-     1, 1, 1, 0},
+     3,
+     {0.0516f, 0.2719f, 2.0062f},
+     {{0.1158f, 0.3661f, 0.3439f}, {0.1836f, 0.1864f, 0}, {0.46f, 0, 0.0402f}},
+     0,
+     0,
+     0,
+     0},
+    {1,
+     4,
+     {0.362f, 2.144f, 8.555f, 34.833f},
+     {{0.0544f, 0.1245f, 0.2177f},
+      {0.2436f, 0.2435f, 0.189f},
+      {0.3105f, 0.3158f, 0.3742f},
+      {0.3913f, 0.3161f, 0.2189f}},
+     1,
+     1,
+     1,
+     0},
     {0},
     {1, 2, {20, 3}, {{0.5f, 0.25f, 0}, {0.5f, 0.5f, 1}}, 1, 0, 0, 1},
     {1, 1, {12}, {{1, 0.5f, 0.25f}}, 0, 1, 0, 0},
@@ -103,8 +118,8 @@ static void equals_twin(void **state)
                    {5, 2, 1, 1, 500},
                    {63, 3, 3, 45, 250}};
     for (size_t k = 0; k < sizeof windows / sizeof *windows; k++) {
-        sss_scene s = sss_scene_make(windows[k].x, windows[k].y, windows[k].width, windows[k].height,
-                                     windows[k].focal);
+        sss_scene s =
+            sss_scene_make(windows[k].x, windows[k].y, windows[k].width, windows[k].height, windows[k].focal);
         s.twin.frame.camera.focal[1] *= 1.3f;
         s.twin.frame.camera.jitter[0] = 0.3f;
         sss_scene_random(&s, (uint32_t)k + 1);
@@ -143,7 +158,8 @@ static sss_scene impulse(float mm, size_t *middle)
     return s;
 }
 
-/* Of a Gaussian that ends at k sigma: the share that is left, and the share of its variance that is left, normalized. */
+/* Of a Gaussian that ends at k sigma: the share that is left, and the share of its variance that is left,
+ * normalized. */
 static double share_within(int separable, double k)
 {
     double line = erf(k / sqrt(2.0));
@@ -157,7 +173,8 @@ static double variance_within(int separable, double k)
     return 1 - k * k / 2 * exp(-k * k / 2) / (1 - exp(-k * k / 2));
 }
 
-/* What stays at the pixel is the unblurred share and the peaks of the Gaussians, 1 / (2 pi sigma²) in pixels. */
+/* What stays at the pixel is the unblurred share and the peaks of the Gaussians, 1 / (2 pi sigma²) in pixels.
+ */
 static void unblurred_share(void **state)
 {
     (void)state;
@@ -186,7 +203,8 @@ static void variance_is_kept(void **state)
     (void)state;
     const gaussian_material one = {1, 1, {2}, {{1, 1, 1}}, 0, 0, 0, 0},
                             beside = {1, 2, {2, 5}, {{1, 1, 1}, {0, 0, 0}}, 0, 0, 0, 0};
-    const double mm = sqrt(2.0) * 3 / 24.5; /* 3 sigma end between two pixels; 4.5, twice, are inside of the image */
+    const double mm =
+        sqrt(2.0) * 3 / 24.5; /* 3 sigma end between two pixels; 4.5, twice, are inside of the image */
     for (int k = 0; k < 4; k++) {
         int separable = k & 1;
         size_t middle;
@@ -207,8 +225,8 @@ static void variance_is_kept(void **state)
     }
 }
 
-/* Rows and columns are the whole disk, up to the corners of the square: 0.57 % of the widest Gaussian's light, 4e-5 of
- * narrow ones'. */
+/* Rows and columns are the whole disk, up to the corners of the square: 0.57 % of the widest Gaussian's
+ * light, 4e-5 of narrow ones'. */
 static void separable_equals_full(void **state)
 {
     (void)state;
@@ -277,7 +295,8 @@ static void occlusion_is_black(void **state)
         size_t edge = 32 * (size_t)s.twin.frame.columns + 95;
         double sigma = sqrt(12.0) * 2; /* pixels of 0.5 mm */
         for (size_t c = 0; c < 3; c++) {
-            double blurred = (double)mixtures[5].weight[0][c], half = 0.5 + 0.5 / sqrt(2 * 3.14159265358979) / sigma;
+            double blurred = (double)mixtures[5].weight[0][c],
+                   half = 0.5 + 0.5 / sqrt(2 * 3.14159265358979) / sigma;
             assert_true(fabs((double)s.filtered[c * s.n + edge] - (1 - blurred * (1 - half))) < 2e-3);
             assert_true(fabs((double)s.filtered[c * s.n + edge - 40] - 1) < 1e-5);
         }
@@ -285,7 +304,8 @@ static void occlusion_is_black(void **state)
     }
 }
 
-/* Every material keeps its own light, whatever lies beside it: noisy borders, jumps in depth, nothing at all. */
+/* Every material keeps its own light, whatever lies beside it: noisy borders, jumps in depth, nothing at all.
+ */
 static void materials_never_leak(void **state)
 {
     (void)state;
@@ -330,7 +350,8 @@ static void nothing_to_scatter(void **state)
     }
 }
 
-/* The widest is 34.8 mm²: 3 sigma are 17.7 mm, and from where those are under half a pixel on, the light stays. */
+/* The widest is 34.8 mm²: 3 sigma are 17.7 mm, and from where those are under half a pixel on, the light
+ * stays. */
 static void far_away_it_is_the_plain_surface(void **state)
 {
     (void)state;

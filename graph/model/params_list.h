@@ -1,5 +1,5 @@
-/* Rows whose value is a list of maps (RL_ROWS): the part of params.h's functions that deals with them; not for
- * others. */
+/* Rows whose value is a list of maps (RL_ROWS): the part of params.h's functions that deals with them; not
+ * for others. */
 #ifndef RL_MODEL_PARAMS_LIST_H
 #define RL_MODEL_PARAMS_LIST_H
 
