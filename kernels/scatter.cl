@@ -166,21 +166,28 @@ static inline floatv scatter_tilt(const inputs_t *in, const vector_t *v, floatv 
                  MOST_TILT);
 }
 
-/* Area of the surface that a pixel sees, m² on the plane z = -1 times f_x·f_y: |dP/dx × dP/dy| of
- * P = ((x - c_x)/f_x z, -(y - c_y)/f_y z, -z), for depth z with slopes from its neighbours. */
+/* Area of the surface that pixels (x, y) of depth z see, m² on the plane z = -1 times f_x·f_y: |dP/dx × dP/dy| of
+ * P = ((x - c_x)/f_x z, -(y - c_y)/f_y z, -z); zx and zy are the slopes, metres a pixel. */
+static inline floatv scatter_area_at(constant frame_t *f, floatv x, int y, floatv z, floatv zx, floatv zy)
+{
+    constant camera_t *c = &f->camera;
+    zx *= c->focal[0];
+    zy *= c->focal[1];
+    floatv rx = rl_ray_x(f, c, x);
+    float ry = rl_ray_y(f, c, (float)y);
+    /* The cross product of (z + rx zx, ry zx, -zx) and (rx zy, ry zy - z, -zy), divided by z. */
+    floatv n = z + rx * zx - ry * zy;
+    return z * sqrt(zx * zx + zy * zy + n * n);
+}
+
+/* The same for all vectors of RL_PHASE4 planes, with slopes from the neighbours. */
 static inline void scatter_area(global const float *depth, global const uint *stencil, global float *area,
                                 constant frame_t *f)
 {
     vector_t v = scatter_vector(f);
-    constant camera_t *c = &f->camera;
-    floatv z = rl_vload(0, depth + v.at);
-    floatv zx = scatter_slope(depth, stencil, f, &v, 1, 0) * c->focal[0];
-    floatv zy = scatter_slope(depth, stencil, f, &v, 0, 1) * c->focal[1];
-    floatv rx = rl_ray_x(f, c, rl_to_floatv((RL_LANES + v.sx) * 4 + v.px));
-    float ry = rl_ray_y(f, c, (float)(4 * v.sy + v.py));
-    /* The cross product of (z + rx zx, ry zx, -zx) and (rx zy, ry zy - z, -zy), divided by z. */
-    floatv n = z + rx * zx - ry * zy;
-    rl_vstore(z * sqrt(zx * zx + zy * zy + n * n), 0, area + v.at);
+    floatv zx = scatter_slope(depth, stencil, f, &v, 1, 0), zy = scatter_slope(depth, stencil, f, &v, 0, 1);
+    floatv x = rl_to_floatv((RL_LANES + v.sx) * 4 + v.px);
+    rl_vstore(scatter_area_at(f, x, 4 * v.sy + v.py, rl_vload(0, depth + v.at), zx, zy), 0, area + v.at);
 }
 
 /* ---- the way out -------------------------------------------------------------------------------------- */

@@ -8,7 +8,8 @@
  * How wrong: the 3 sigma leave out 1.1 % of the widest Gaussian (0.5 % as a square) and, normalized, 5.1 % of its
  * variance (2.7 %); of those less than two thirds as wide, 0.04 % (0.014 %). A Gaussian under about half a pixel wide
  * is sampled too coarsely: at sigma = 0.5 pixels its variance is 15 % too small, at 0.3 pixels it is all gone.
- * Separable distances leave out the mixed term of slopes: exact on a plane that is tilted along a row or column. */
+ * Separable distances leave out the mixed term of slopes: exact on a plane that is tilted along a row or column.
+ * `weighting: area` counts a sample by the surface that its pixel sees, in both directions of the separable form. */
 
 #define MOST_GAUSSIANS 4    /* the table's, passes/sss_gaussian.c */
 #define TAIL           4.5f /* sigma */
@@ -18,8 +19,15 @@
 #define GAUSSIAN_PORTS                                                                                       \
     global const float *diffuse, global const float *lit, global const float *albedo,                        \
         global const float *normal, global const float *depth, global const uint *stencil,                   \
-        global float *line, global float *filtered, global float *color, constant params_t *p,               \
+        global float *area, global float *line, global float *filtered, global float *color,                 \
+        constant params_t *p,                                                                                \
         constant frame_t *f, constant material_t *materials
+
+#if P_weighting == WEIGHTING_AREA
+#define AREA(x) x
+#else
+#define AREA(x)
+#endif
 
 /* Where a Gaussian of a material ends. */
 typedef struct gaussian_t {
@@ -31,24 +39,26 @@ typedef struct gaussian_t {
 /* The lanes of a vector that have one material. */
 typedef struct lanes_t {
     constant frame_t *f;
-    global const float *depth;
+    global const float *depth, *area;
     global const uint *stencil;
     global const float *light; /* what is averaged: 3 planes */
     int x, y;                  /* of lane 0 */
     int material;
     intv keep;    /* all bits: samples that are none count as black */
     floatv z, rx; /* depth, and the ray on the plane z = -1 */
+    floatv per_area; /* 1 / the surface that the pixel sees */
     float ry;
     float nearest, slant; /* the least depth, the longest ray of the lanes */
 } lanes_t;
 
-static inline lanes_t gather_lanes(constant frame_t *f, global const float *depth, global const uint *stencil,
-                                   global const float *light, constant material_t *mat, int material, intv mine,
+static inline lanes_t gather_lanes(constant frame_t *f, global const float *depth, global const float *area,
+                                   global const uint *stencil, global const float *light, constant material_t *mat, int material, intv mine,
                                    int x, int y)
 {
     lanes_t l;
     l.f = f;
     l.depth = depth;
+    l.area = area;
     l.stencil = stencil;
     l.light = light;
     l.x = x;
@@ -56,6 +66,8 @@ static inline lanes_t gather_lanes(constant frame_t *f, global const float *dept
     l.material = material;
     l.keep = mat->profile_border == BORDER_OCCLUDE ? -1 : 0;
     l.z = rl_load(depth, rl_index(f, l.x, l.y));
+    l.per_area = 1.0f;
+    AREA(l.per_area = 1.0f / rl_load(area, rl_index(f, x, y));)
     l.rx = rl_ray_x(f, &f->camera, rl_to_floatv(RL_LANES + l.x));
     l.ry = rl_ray_y(f, &f->camera, (float)l.y);
     l.nearest = scatter_nearest(l.z, mine);
@@ -90,6 +102,7 @@ typedef struct sample_t {
     int at;
     intv same;  /* inside of the image, and the material is the lanes' */
     floatv far2; /* distance², m²; for what is no sample, as if it were as deep as the lane */
+    floatv area; /* relative to the lane's own; 1 for what is no sample */
 } sample_t;
 
 static inline sample_t sample_of(const lanes_t *l, int dx, int dy)
@@ -106,12 +119,14 @@ static inline sample_t sample_of(const lanes_t *l, int dx, int dy)
     floatv dz = scatter_keep(rl_load(l->depth, s.at) - l->z, s.same);
     floatv a = fma(dz, l->rx + u, l->z * u), b = fma(dz, (floatv)(l->ry + v), l->z * v);
     s.far2 = fma(a, a, fma(b, b, dz * dz));
+    s.area = 1.0f;
+    AREA(s.area = rl_select(s.area, rl_load(l->area, s.at) * l->per_area, s.same);)
     return s;
 }
 
 static inline floatv weight_of(const gaussian_t *gaussian, const lanes_t *l, const sample_t *s)
 {
-    return scatter_keep(weight_exp2(s->far2 * gaussian->fall),
+    return scatter_keep(weight_exp2(s->far2 * gaussian->fall) AREA(*s->area),
                         (s->same | l->keep) & (s->far2 <= gaussian->reach2));
 }
 
@@ -169,7 +184,7 @@ static inline void mean_along(int axis, const lanes_t *l, const gaussian_t *gaus
 
 /* Gaussian g along the rows, into `line`. */
 static inline void filter_rows(int g, global const float *diffuse, global const float *depth,
-                               global const uint *stencil, global float *line, constant frame_t *f,
+                               global const float *area, global const uint *stencil, global float *line, constant frame_t *f,
                                constant material_t *materials)
 {
     int x = RL_W * (int)get_global_id(0), y = get_global_id(1), at = rl_index(f, x, y), found = 0;
@@ -182,7 +197,7 @@ static inline void filter_rows(int g, global const float *diffuse, global const 
         constant material_t *mat = &materials[m];
         if (!mat->has_profile || g >= mat->profile_gaussians_n)
             continue;
-        lanes_t l = gather_lanes(f, depth, stencil, diffuse, mat, m, mine, x, y);
+        lanes_t l = gather_lanes(f, depth, area, stencil, diffuse, mat, m, mine, x, y);
         gaussian_t gaussian = gaussian_of(mat, g, &l);
         floatv mean[3];
         mean_along(ALONG_X, &l, &gaussian, mean);
@@ -196,7 +211,7 @@ static inline void filter_rows(int g, global const float *diffuse, global const 
 
 /* Gaussian g of `line` along the columns, blended into `filtered`; the first puts the unblurred share there. */
 static inline void filter_columns(int g, global const float *diffuse, global const float *depth,
-                                  global const uint *stencil, global const float *line, global float *filtered,
+                                  global const float *area, global const uint *stencil, global const float *line, global float *filtered,
                                   constant frame_t *f, constant material_t *materials)
 {
     int2 place = place_in_strip(f);
@@ -212,7 +227,7 @@ static inline void filter_columns(int g, global const float *diffuse, global con
         constant material_t *mat = &materials[m];
         if (!mat->has_profile || g >= mat->profile_gaussians_n)
             continue;
-        lanes_t l = gather_lanes(f, depth, stencil, line, mat, m, mine, place.x, place.y);
+        lanes_t l = gather_lanes(f, depth, area, stencil, line, mat, m, mine, place.x, place.y);
         gaussian_t gaussian = gaussian_of(mat, g, &l);
         floatv mean[3];
         mean_along(ALONG_Y, &l, &gaussian, mean);
@@ -229,11 +244,11 @@ static inline void filter_columns(int g, global const float *diffuse, global con
 #define GAUSSIAN(g)                                                                                          \
     kernel void sss_gaussian_rows_##g(GAUSSIAN_PORTS)                                                        \
     {                                                                                                        \
-        filter_rows(g, diffuse, depth, stencil, line, f, materials);                                         \
+        filter_rows(g, diffuse, depth, area, stencil, line, f, materials);                                         \
     }                                                                                                        \
     kernel void sss_gaussian_columns_##g(GAUSSIAN_PORTS)                                                     \
     {                                                                                                        \
-        filter_columns(g, diffuse, depth, stencil, line, filtered, f, materials);                            \
+        filter_columns(g, diffuse, depth, area, stencil, line, filtered, f, materials);                            \
     }
 GAUSSIAN(0)
 GAUSSIAN(1)
@@ -302,7 +317,7 @@ kernel void sss_gaussian_disk(GAUSSIAN_PORTS)
         constant material_t *mat = &materials[m];
         if (!mat->has_profile || !mat->profile_gaussians_n)
             continue;
-        lanes_t l = gather_lanes(f, depth, stencil, diffuse, mat, m, mine, place.x, place.y);
+        lanes_t l = gather_lanes(f, depth, area, stencil, diffuse, mat, m, mine, place.x, place.y);
         floatv all[3] = {out[0], out[1], out[2]};
         mean_around(&l, mat, all);
         for (int c = 0; c < 3; c++)
@@ -313,6 +328,28 @@ kernel void sss_gaussian_disk(GAUSSIAN_PORTS)
 }
 
 #endif
+
+/* Slope of the depth along a row or a column, as scatter_slope has it. */
+static inline floatv slope_of(global const float *depth, global const uint *stencil, constant frame_t *f, int x,
+                              int y, int dx, int dy)
+{
+    int at = rl_index(f, x, y), step = dy ? dy * f->stride : dx;
+    int i = y + dy < f->rows ? at + step : at, j = y >= dy ? at - step : at;
+    intv id = rl_as_intv(rl_load_id(stencil, at));
+    floatv z = rl_load(depth, at), a = rl_load(depth, i) - z, b = z - rl_load(depth, j);
+    intv has_a = (rl_as_intv(rl_load_id(stencil, i)) == id) & rl_insidev(f, x + dx, y + dy),
+         has_b = (rl_as_intv(rl_load_id(stencil, j)) == id) & rl_insidev(f, x - dx, y - dy);
+    intv take_a = has_a & (~has_b | (fabs(a) <= fabs(b)));
+    return rl_select(scatter_keep(b, has_b), a, take_a);
+}
+
+kernel void sss_gaussian_area(GAUSSIAN_PORTS)
+{
+    int x = RL_W * (int)get_global_id(0), y = get_global_id(1), at = rl_index(f, x, y);
+    AREA(rl_store(scatter_area_at(f, rl_to_floatv(RL_LANES + x), y, rl_load(depth, at), slope_of(depth, stencil, f, x, y, 1, 0),
+                                  slope_of(depth, stencil, f, x, y, 0, 1)),
+                  area, at);)
+}
 
 kernel void sss_gaussian_resolve(GAUSSIAN_PORTS)
 {

@@ -8,14 +8,18 @@
 
 typedef struct sss_gaussian_params {
     int32_t separable;
+    int32_t weighting;
 } sss_gaussian_params;
 
 static const rl_param params[] = {
     P(sss_gaussian_params, RL_BOOL, separable, 0, 1, 1, "",
       "a row and a column of pixels a Gaussian, or the whole disk at once", .source = "Helix",
       .structural = true),
+    P_ENUM(sss_gaussian_params, weighting, "area|plain", 0,
+           "what a sample stands for: the surface that its pixel sees, or its pixel alone as in Helix",
+           .structural = true),
 };
-RL_PARAMS_MATCH(sss_gaussian_params, 1);
+RL_PARAMS_MATCH(sss_gaussian_params, 2);
 
 static const rl_param gaussian_rows[] = {
     M(RL_F32, variance_mm2, 1e-6, 1e6, 0, "mm2", "sigma², along each axis", .required = true),
@@ -39,6 +43,7 @@ static const rl_port ports[] = {
     {"normal", RL_READ, RL_NORMAL, .help = "shading normal, for the way out"},
     {"depth", RL_READ, RL_SCALAR, .help = "planar, metres"},
     {"stencil", RL_READ, RL_ID, .help = "material"},
+    {"area", RL_SCRATCH, RL_SCALAR, .help = "surface that a pixel sees"},
     {"line", RL_SCRATCH, RL_RGB, .help = "one Gaussian along the rows"},
     {"filtered", RL_SCRATCH, RL_RGB, .help = "scattered radiance below the surface"},
     {"color", RL_WRITE, RL_RGB, .help = "radiance, scene-linear"},
@@ -51,6 +56,7 @@ static const rl_port ports[] = {
     }
 
 static const rl_step steps[] = {
+    {"sss_gaussian_area", .domain = RL_EVERY_VECTOR, .when = "weighting", .is = 0},
     LINES(0),
     LINES(1),
     LINES(2),
