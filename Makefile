@@ -49,7 +49,9 @@ TOOL_O  := $(TOOL_C:%.c=$(BUILD)/%.o)
 MAIN_O  := $(BUILD)/graph/tool/relit.o
 TESTS   := $(patsubst tests/%.c,$(BUILD)/tests/%,$(wildcard tests/test_*.c))
 SCRIPTS := $(wildcard tests/test_*.sh)
-HELP_O  := $(patsubst tests/%.c,$(BUILD)/tests/%.o,$(filter-out tests/test_%.c tests/bench_%.c tests/example.c tests/fuzz/main.c,$(wildcard tests/*.c tests/fuzz/*.c)))
+# Programs of their own; all other files in tests/ are helpers that they share.
+MAINS   := tests/test_%.c tests/bench_%.c tests/fit_%.c tests/make_%.c tests/example.c tests/accuracy.c tests/temporal.c tests/fuzz/main.c
+HELP_O  := $(patsubst tests/%.c,$(BUILD)/tests/%.o,$(filter-out $(MAINS),$(wildcard tests/*.c tests/fuzz/*.c)))
 
 all: $(BUILD)/relit $(BUILD)/librelit.a $(BUILD)/librelit.so $(BUILD)/relit_oiio.so
 
@@ -149,7 +151,8 @@ bench: all $(BUILD)/tests/bench_sss $(BUILD)/tests/bench_capture
 	@BUILD=$(BUILD) tests/bench_batch.sh
 
 $(BUILD)/tests/fuzz/fuzz: $(BUILD)/tests/fuzz/main.o $(BUILD)/tests/sanitizers.o $(BUILD)/tests/help.a $(BUILD)/tool.a $(BUILD)/librelit.a
-	$(CC) $(LDFLAGS) -o $@ $^ $(LIBS) -lcmocka
+	$(call say,link $@)
+	$(Q)$(CC) $(LDFLAGS) -o $@ $^ $(LIBS) -lcmocka
 
 # Changed inputs against parsers and readers, under the sanitizers; tests/test_fuzz.c is its short form.
 FUZZ_SECONDS ?= 60
