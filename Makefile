@@ -51,6 +51,7 @@ TESTS   := $(patsubst tests/%.c,$(BUILD)/tests/%,$(wildcard tests/test_*.c))
 SCRIPTS := $(wildcard tests/test_*.sh)
 # Programs of their own; all other files in tests/ are helpers that they share.
 MAINS   := tests/test_%.c tests/bench_%.c tests/fit_%.c tests/make_%.c tests/example.c tests/accuracy.c tests/temporal.c tests/fuzz/main.c
+BENCHES := $(patsubst tests/%.c,$(BUILD)/tests/%,$(wildcard tests/bench_*.c))
 HELP_O  := $(patsubst tests/%.c,$(BUILD)/tests/%.o,$(filter-out $(MAINS),$(wildcard tests/*.c tests/fuzz/*.c)))
 
 all: $(BUILD)/relit $(BUILD)/librelit.a $(BUILD)/librelit.so $(BUILD)/relit_oiio.so
@@ -133,7 +134,7 @@ $(BUILD)/tests/%: $(BUILD)/tests/%.o $(BUILD)/tests/sanitizers.o $(BUILD)/tests/
 # It loads the module; so does whatever writes PNG files.
 $(BUILD)/tests/test_image_file: | $(BUILD)/relit_oiio.so
 
-test-build: all $(TESTS)
+test-build: all $(TESTS) $(BENCHES)
 
 test: deps
 	@$(MAKE) --no-print-directory -j2 test-build layers
@@ -146,7 +147,7 @@ test-asan: deps
 	@BUILD=build-asan ASAN_OPTIONS=detect_leaks=0 tests/run.sh $(patsubst $(BUILD)/%,build-asan/%,$(TESTS))
 
 # Kernels and codecs against their peers; tests/bench_batch.sh says what can be chosen.
-bench: all $(BUILD)/tests/bench_sss $(BUILD)/tests/bench_capture
+bench: all $(BENCHES)
 	$(BUILD)/tests/bench_sss
 	@BUILD=$(BUILD) tests/bench_batch.sh
 
