@@ -137,11 +137,12 @@ test: deps
 	@$(MAKE) --no-print-directory -j2 test-build layers
 	@BUILD=$(BUILD) tests/run.sh $(TESTS) $(SCRIPTS)
 
-ASAN = BUILD=build-asan SAN="-fsanitize=address,undefined -fno-sanitize-recover=undefined"
+SANITIZE = -fsanitize=address,undefined -fno-sanitize-recover=undefined
+ASAN     = BUILD=build-asan SAN="$(SANITIZE)"
 
 test-asan: deps
 	@$(MAKE) --no-print-directory -j2 $(ASAN) test-build
-	@BUILD=build-asan ASAN_OPTIONS=detect_leaks=0 tests/run.sh $(patsubst $(BUILD)/%,build-asan/%,$(TESTS))
+	@$(ASAN) ASAN_OPTIONS=detect_leaks=0 tests/run.sh $(patsubst $(BUILD)/%,build-asan/%,$(TESTS))
 
 $(BUILD)/tests/fuzz/fuzz: $(BUILD)/tests/fuzz/main.o $(BUILD)/tests/sanitizers.o $(BUILD)/tests/help.a $(BUILD)/tool.a $(BUILD)/librelit.a
 	$(CC) $(LDFLAGS) -o $@ $^ $(LIBS) -lcmocka
