@@ -144,6 +144,11 @@ test-asan: deps
 	@$(MAKE) --no-print-directory -j2 $(ASAN) test-build
 	@$(ASAN) ASAN_OPTIONS=detect_leaks=0 tests/run.sh $(patsubst $(BUILD)/%,build-asan/%,$(TESTS))
 
+# Kernels and codecs against their peers; tests/bench_batch.sh says what can be chosen.
+bench: all $(BUILD)/tests/bench_sss $(BUILD)/tests/bench_capture
+	$(BUILD)/tests/bench_sss
+	@BUILD=$(BUILD) tests/bench_batch.sh
+
 $(BUILD)/tests/fuzz/fuzz: $(BUILD)/tests/fuzz/main.o $(BUILD)/tests/sanitizers.o $(BUILD)/tests/help.a $(BUILD)/tool.a $(BUILD)/librelit.a
 	$(CC) $(LDFLAGS) -o $@ $^ $(LIBS) -lcmocka
 
@@ -195,4 +200,4 @@ layers:
 clean:
 	rm -rf $(BUILD) build-asan
 
-.PHONY: all demo test test-build test-asan fuzz deps install format format-check layers clean
+.PHONY: all demo bench test test-build test-asan deps install format format-check layers clean fuzz

@@ -30,6 +30,8 @@ typedef struct rl_session rl_session;
 /* ---- opening ---------------------------------------------------------------------------------------------
  */
 
+/* A frame whose files are missing or broken: an error of that frame; or no output for it; or the layers and the
+ * camera of the frame before it in the run under its number. Whichever, history ends there. */
 typedef enum rl_on_missing { RL_MISSING_ERROR, RL_MISSING_SKIP, RL_MISSING_HOLD } rl_on_missing;
 
 /* A value of the pipeline by its dotted path: {"graph.sss.taps", "55"}. `value` is one YAML value; "null"

@@ -1,5 +1,6 @@
 #include "graph/run/sink.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -147,14 +148,30 @@ static void add_coverage(channel_list *list, const rl_sink_image *images, size_t
                         (rl_exr_source){.type = type, .floats = coverage, .stride = (size_t)width});
 }
 
-static size_t add_attributes(const rl_sink_output *o, const rl_sink_frame *f, rl_exr_attribute *attrs)
+/* 24 is 24/1, 23.976… of broadcast 24000/1001, anything else thousandths. */
+static rl_exr_value rational_fps(double fps)
+{
+    static const int denominators[] = {1, 1001, 1000};
+    rl_exr_value v = {.type = RL_EXR_T_RATIONAL};
+    for (int i = 0; i < 3; i++) {
+        int unit = denominators[i] == 1001 ? 1000 : 1;
+        v.v[1] = denominators[i];
+        v.v[0] = floor(fps * denominators[i] / unit + 0.5) * unit;
+        if (fabs(v.v[0] / v.v[1] - fps) < 5e-4)
+            break;
+    }
+    return v;
+}
+
+/* `colors`: the file holds an rgb image. Data has neither primaries nor a colour space. */
+static size_t add_attributes(const rl_sink_output *o, const rl_sink_frame *f, bool colors, rl_exr_attribute *attrs)
 {
     size_t n = 0;
     attrs[n++] = (rl_exr_attribute){"relit:version", {.type = RL_EXR_T_STRING, .text = RL_VERSION}};
     attrs[n++] = (rl_exr_attribute){"relit:pipeline", {.type = RL_EXR_T_STRING, .text = f->pipeline}};
-    if (o->space)
+    if (o->space && colors)
         attrs[n++] = (rl_exr_attribute){"relit:colorspace", {.type = RL_EXR_T_STRING, .text = o->space}};
-    if (o->primaries.known) {
+    if (o->primaries.known && colors) {
         rl_exr_value v = {.type = RL_EXR_T_CHROMATICITIES};
         memcpy(v.v, o->primaries.xy, sizeof o->primaries.xy);
         attrs[n++] = (rl_exr_attribute){"chromaticities", v};
@@ -162,8 +179,7 @@ static size_t add_attributes(const rl_sink_output *o, const rl_sink_frame *f, rl
     rl_exr_value fps;
     bool has = f->source && rl_exr_attr(f->source, f->source_part, "framesPerSecond", &fps);
     if (!has && f->fps > 0)
-        attrs[n++] = (rl_exr_attribute){"framesPerSecond",
-                                        {.type = RL_EXR_T_RATIONAL, .v = {(double)(int)(f->fps * 1000 + 0.5), 1000}}};
+        attrs[n++] = (rl_exr_attribute){"framesPerSecond", rational_fps(f->fps)};
     return n;
 }
 
@@ -178,6 +194,9 @@ static rl_code write_exr(const char *path, const rl_sink_output *o, const rl_sin
         add_image(&list, &images[i], type, r);
     add_coverage(&list, images, n, coverage, r->width, type);
     uint64_t beyond = 0;
+    bool colors = false;
+    for (size_t i = 0; i < n; i++)
+        colors |= images[i].format == RL_RGB;
     rl_exr_attribute attrs[8];
     int compression = o->spec->compression ? rl_exr_compression_named(o->spec->compression) : RL_EXR_ZIP;
     rl_exr_image image = {.data_window = r->window,
@@ -188,7 +207,7 @@ static rl_code write_exr(const char *path, const rl_sink_output *o, const rl_sin
                           .level = o->spec->level,
                           .dwa_level = o->spec->quality > 0 ? (float)o->spec->quality : 0,
                           .attrs = attrs,
-                          .n_attrs = add_attributes(o, f, attrs),
+                          .n_attrs = add_attributes(o, f, colors, attrs),
                           .copy_from = f->source,
                           .copy_part = f->source_part,
                           .copy = kept_attributes,
