@@ -17,6 +17,7 @@ for program in "$@"; do
         echo "$name: ended with status $status after $good tests"
     fi
     [ "$bad" -gt 0 ] && printf '%s\n' "$log" | sed "s/^/    /"
+    [ "$bad" -eq 0 ] && grep '# SKIP' <<<"$log" | sed "s/^/    /"
     [ "$skipped" -gt 0 ] && note=", $skipped skipped" || note=
     printf '%-32s %3d passed, %d failed%s  (%d ms)\n' "$name" "$good" "$bad" "$note" $((($(date +%s%N) - start) / 1000000))
     passed=$((passed + good)) failed=$((failed + bad))
