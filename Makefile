@@ -140,11 +140,12 @@ test: deps
 	@$(MAKE) --no-print-directory -j2 test-build layers
 	@BUILD=$(BUILD) tests/run.sh $(TESTS) $(SCRIPTS)
 
-ASAN = BUILD=build-asan SAN="-fsanitize=address,undefined -fno-sanitize-recover=undefined"
+SANITIZE = -fsanitize=address,undefined -fno-sanitize-recover=undefined
+ASAN     = BUILD=build-asan SAN="$(SANITIZE)"
 
 test-asan: deps
 	@$(MAKE) --no-print-directory -j2 $(ASAN) test-build
-	@BUILD=build-asan ASAN_OPTIONS=detect_leaks=0 tests/run.sh $(patsubst $(BUILD)/%,build-asan/%,$(TESTS))
+	@$(ASAN) ASAN_OPTIONS=detect_leaks=0 tests/run.sh $(patsubst $(BUILD)/%,build-asan/%,$(TESTS))
 
 # Kernels and codecs against their peers; tests/bench_batch.sh says what can be chosen.
 bench: all $(BENCHES)
