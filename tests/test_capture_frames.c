@@ -140,28 +140,66 @@ static void test_missing(void **state)
     sequence_leave(folder, s, 6);
 }
 
-/* A frame without history is its own picture; `held` and `skipped` frames give and take none. */
+/* A frame without history is its own picture; held and skipped frames give and take none. */
 static void test_cuts(void **state)
 {
     (void)state;
-    scene s[4];
+    scene s[5];
     sequence_outcome o;
-    capture_form f = {.name = "cuts", .frames = "1-4"};
-    char *folder = sequence_make(&f, s, 4);
+    capture_form f = {.name = "cuts", .frames = "1-5"};
+    char *folder = sequence_make(&f, s, 5), *out = path_in(folder, "out");
     sequence_run(folder, sequence_with_taa, (rl_options){0}, &o);
-    assert_true(sequence_off(sequence_out(folder), "cap.0001.exr", &s[0]) < 2e-6);
-    assert_true(sequence_off(sequence_out(folder), "cap.0003.exr", &s[2]) > 1e-4); /* mixed with its past */
-    sequence_remove(folder, 2);
+    assert_true(sequence_off(out, "cap.0001.exr", &s[0]) < 2e-6);
+    assert_true(sequence_off(out, "cap.0004.exr", &s[3]) > 1e-4); /* mixed with its past */
+    sequence_remove(folder, 3);
     for (int how = RL_MISSING_ERROR; how <= (int)RL_MISSING_HOLD; how++) {
         sequence_run(folder, sequence_with_taa, (rl_options){.on_missing = (rl_on_missing)how}, &o);
-        assert_true(sequence_off(sequence_out(folder), "cap.0003.exr", &s[2]) < 2e-6);
-        assert_true(sequence_off(sequence_out(folder), "cap.0004.exr", &s[3]) > 1e-4);
+        assert_true(sequence_off(out, "cap.0004.exr", &s[3]) < 2e-6);
+        assert_true(sequence_off(out, "cap.0005.exr", &s[4]) > 1e-4);
     }
-    assert_true(sequence_off(sequence_out(folder), "cap.0002.exr", &s[0]) < 2e-6); /* the held one */
-    sequence_run(folder, sequence_with_taa, (rl_options){.frames = "1,3-4"},
+    assert_true(sequence_off(out, "cap.0002.exr", &s[1]) > 1e-4);
+    assert_true(sequence_off(out, "cap.0003.exr", &s[1]) < 2e-6); /* the held one: frame 2 without its past */
+    sequence_run(folder, sequence_with_taa, (rl_options){.frames = "1-2,4-5"},
                  &o); /* a gap in what is processed */
-    assert_true(sequence_off(sequence_out(folder), "cap.0003.exr", &s[2]) < 2e-6);
-    sequence_leave(folder, s, 4);
+    assert_true(sequence_off(out, "cap.0004.exr", &s[3]) < 2e-6);
+    free(out);
+    sequence_leave(folder, s, 5);
+}
+
+/* The same from the command line, with its exit statuses. */
+static void test_command_line(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *how;
+        int status, files;
+    } all[] = {
+        {"error", 1, 2},
+        {"skip", 0, 2},
+        {"hold", 0, 3},
+    };
+    scene s[3];
+    capture_form f = {.name = "cli", .frames = "1-3"};
+    char *folder = sequence_make(&f, s, 3), *pipeline = path_in(folder, "p.yaml");
+    file_write(folder, "p.yaml", capture_pipeline, strlen(capture_pipeline));
+    sequence_remove(folder, 2);
+    for (size_t i = 0; i < sizeof all / sizeof *all; i++) {
+        char *out = folder_new();
+        const char *run[] = {"run", pipeline,       "--capture", folder, "--out",
+                             out,   "--on-missing", all[i].how,  NULL};
+        const char *check[] = {"check", pipeline, "--capture", folder, "--on-missing", all[i].how, NULL};
+        tool_result r = tool_run(run), c = tool_run(check);
+        assert_int_equal(r.status, all[i].status);
+        assert_int_equal(c.status, all[i].status ? 2 : 0);
+        assert_non_null(strstr(r.err, "cap.0002.exr"));
+        assert_non_null(strstr(c.err, "cap.0002.exr"));
+        assert_int_equal(folder_files(out), all[i].files);
+        tool_result_free(&r);
+        tool_result_free(&c);
+        folder_remove(out);
+    }
+    free(pipeline);
+    sequence_leave(folder, s, 3);
 }
 
 /* ---- several captures ---- */
@@ -215,7 +253,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_a_camera_a_frame), cmocka_unit_test(test_frames_option),
         cmocka_unit_test(test_missing),          cmocka_unit_test(test_cuts),
-        cmocka_unit_test(test_two_captures),
+        cmocka_unit_test(test_command_line),     cmocka_unit_test(test_two_captures),
     };
     return cmocka_run_group_tests(tests, setup, teardown);
 }
