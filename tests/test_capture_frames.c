@@ -237,7 +237,7 @@ static void test_two_captures(void **state)
     char *same = text_replace(capture_pipeline, "{capture}.{frame", "{capture}.c.color.{frame");
     options =
         (rl_options){.pipeline_text = same, .captures = both, .n_captures = 1, .dump = dump, .n_dump = 1};
-    expect_wrong(&options, "would both write 'cap.c.color.0001.exr'");
+    expect_wrong(&options, "would both write 'out/cap.c.color.0001.exr'");
     free(same);
     options = (rl_options){.pipeline_text = capture_pipeline, .captures = both, .n_captures = 2, .out = one};
     expect_wrong(
