@@ -161,8 +161,9 @@ typedef struct rl_image_view {
     int x, y, width, height; /* data window */
     int planes;
     const char *format; /* "rgb", "normal", "vec2", "scalar", "id", "lights" */
-    const float *plane[16];
-    size_t stride; /* floats from row to row */
+    const float *plane[16]; /* the first 16; "lights" may have more */
+    size_t stride;          /* floats from row to row */
+    size_t plane_stride;    /* from plane to plane: plane i is at plane[0] + i * plane_stride */
 } rl_image_view;
 
 rl_code rl_session_image(rl_session *session, const char *image, rl_image_view *out, rl_error *err);

@@ -11,8 +11,6 @@
 #include "graph/relit.h"
 #include "graph/run/sink_image.h"
 
-enum { MOST_CHANNELS = 256 };
-
 /* What of the source's header stays true of the result: cameras, time, what a studio put there. */
 static const char *const kept_attributes[] = {"camera:*",        "worldToCamera", "worldToNDC",  "timeCode",
                                               "framesPerSecond", "capDate",       "utcOffset",   "longitude",
@@ -98,20 +96,28 @@ static const char *const *letters(rl_format format, int *n)
 }
 
 typedef struct channel_list {
-    rl_exr_source rows[MOST_CHANNELS];
+    rl_exr_source *rows; /* with room for all */
     size_t n;
-    rl_arena names;
-    bool failed, full; /* out of memory, out of rows */
+    rl_arena arena; /* of the rows and their names */
+    bool failed;    /* out of memory */
 } channel_list;
+
+/* Room for the planes of all images and a coverage for each. */
+static void list_begin(channel_list *list, const rl_sink_image *images, size_t n)
+{
+    size_t most = n;
+    for (size_t i = 0; i < n; i++)
+        most += (size_t)images[i].planes;
+    list->rows = rl_arena_array(&list->arena, most, sizeof *list->rows);
+    list->failed = !list->rows;
+}
 
 static void add_channel(channel_list *list, const char *layer, const char *letter, rl_exr_source source)
 {
-    source.name = *layer ? rl_arena_printf(&list->names, "%s.%s", layer, letter) : rl_arena_strdup(&list->names, letter);
+    source.name = *layer ? rl_arena_printf(&list->arena, "%s.%s", layer, letter) : rl_arena_strdup(&list->arena, letter);
     list->failed |= !source.name;
-    list->full |= list->n == MOST_CHANNELS;
-    if (list->full || list->failed)
-        return;
-    list->rows[list->n++] = source;
+    if (!list->failed)
+        list->rows[list->n++] = source;
 }
 
 static void add_image(channel_list *list, const rl_sink_image *image, rl_exr_pixel type, const region *r)
@@ -120,8 +126,8 @@ static void add_image(channel_list *list, const rl_sink_image *image, rl_exr_pix
     const char *const *names = letters(image->format, &n);
     size_t at = (size_t)r->y0 * image->stride + (size_t)r->x0;
     for (int i = 0; i < image->planes; i++) {
-        const char *letter = i < n ? names[i] : rl_arena_printf(&list->names, "V%d", i);
-        rl_exr_source s = {.stride = image->stride, .type = type, .floats = image->plane[i] + at};
+        const char *letter = i < n ? names[i] : rl_arena_printf(&list->arena, "V%d", i);
+        rl_exr_source s = {.stride = image->stride, .type = type, .floats = image->pixels + (size_t)i * image->plane + at};
         if (image->format == RL_ID) {
             s.type = RL_EXR_UINT;
             s.ids = (const uint32_t *)(const void *)s.floats;
@@ -183,12 +189,11 @@ static rl_code write_exr(const char *path, const rl_sink_output *o, const rl_sin
                          uint64_t *clamped, rl_error *err)
 {
     rl_exr_pixel type = o->spec->type == RL_FLOAT ? RL_EXR_FLOAT : RL_EXR_HALF;
-    channel_list *list = rl_calloc(1, sizeof *list);
-    if (!list)
-        return rl_fail_memory(err, sizeof *list);
+    channel_list list = {0};
+    list_begin(&list, images, n);
     for (size_t i = 0; i < n; i++)
-        add_image(list, &images[i], type, r);
-    add_coverage(list, images, n, coverage, r->width, type);
+        add_image(&list, &images[i], type, r);
+    add_coverage(&list, images, n, coverage, r->width, type);
     uint64_t beyond = 0;
     bool colors = false;
     for (size_t i = 0; i < n; i++)
@@ -197,8 +202,8 @@ static rl_code write_exr(const char *path, const rl_sink_output *o, const rl_sin
     int compression = o->spec->compression ? rl_exr_compression_named(o->spec->compression) : RL_EXR_ZIP;
     rl_exr_image image = {.data_window = r->window,
                           .display_window = f->display_window,
-                          .channels = list->rows,
-                          .n_channels = list->n,
+                          .channels = list.rows,
+                          .n_channels = list.n,
                           .compression = compression < 0 ? RL_EXR_ZIP : (rl_exr_compression)compression,
                           .level = o->spec->level,
                           .dwa_level = o->spec->quality > 0 ? (float)o->spec->quality : 0,
@@ -214,16 +219,10 @@ static rl_code write_exr(const char *path, const rl_sink_output *o, const rl_sin
         image.screen_width = part->screen_width;
         memcpy(image.screen_center, part->screen_center, sizeof image.screen_center);
     }
-    rl_code code = RL_OK;
-    if (list->full)
-        code = rl_fail_file(err, RL_E_CONFIG, path, "output '%s' has more than %d channels", o->spec->name, MOST_CHANNELS);
-    else if (list->failed)
-        code = rl_fail_memory(err, n);
-    else
-        code = rl_exr_write(path, &image, pool, &beyond, err);
+    rl_code code = list.failed ? rl_fail_memory(err, n * sizeof *list.rows)
+                               : rl_exr_write(path, &image, pool, &beyond, err);
     *clamped += beyond;
-    rl_arena_free(&list->names);
-    rl_free(list);
+    rl_arena_free(&list.arena);
     return code;
 }
 

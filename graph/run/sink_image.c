@@ -59,7 +59,7 @@ rl_code rl_sink_write_image(const char *path, const rl_sink_output *output, cons
                             "output '%s': ids and light layers can only be written as EXR",
                             output->spec->name);
     for (int i = 0; i < image->planes; i++)
-        planes.plane[i] = image->plane[i] + first;
+        planes.plane[i] = image->pixels + (size_t)i * image->plane + first;
     rl_image_note notes[] = {{"Software", "relit " RL_VERSION}, {"relit:pipeline", frame->pipeline}};
     rl_image_options options = {.type = image_type(output->spec->type),
                                 .colorspace = output->space,
