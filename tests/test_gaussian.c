@@ -47,7 +47,7 @@ static const gaussian_material mixtures[SSS_MATERIALS] = {
 
 static void run_on(sss_scene *s, int separable, const gaussian_material *m, size_t bytes, cl_session *on)
 {
-    const int32_t params = separable;
+    const int32_t params[2] = {separable, s->twin.area ? AREA : PLAIN};
     const cl_image images[] = {
         {"diffuse", s->diffuse, NULL}, {"lit", s->lit, NULL},           {"albedo", s->albedo, NULL},
         {"normal", s->normal, NULL},   {"depth", s->depth, NULL},       {"stencil", s->stencil, NULL},
@@ -55,7 +55,7 @@ static void run_on(sss_scene *s, int separable, const gaussian_material *m, size
     };
     cl_job job = {.pass = &rl_pass_sss_gaussian,
                   .frame = &s->twin.frame,
-                  .params = &params,
+                  .params = params,
                   .materials = m,
                   .materials_bytes = bytes,
                   .images = images,
@@ -123,6 +123,9 @@ static void equals_twin(void **state)
         s.twin.frame.camera.focal[1] *= 1.3f;
         s.twin.frame.camera.jitter[0] = 0.3f;
         sss_scene_random(&s, (uint32_t)k + 1);
+        compare(&s, SEPARABLE);
+        compare(&s, FULL);
+        s.twin.area = true;
         compare(&s, SEPARABLE);
         compare(&s, FULL);
         sss_scene_free(&s);
@@ -265,6 +268,7 @@ static void energy_is_kept(void **state)
         for (uint32_t id = 1; id < 6; id++) {
             sss_scene s = sss_scene_make(3, 1, 180, 110, 300);
             sss_scene_flat(&s, id, 0.5f, mixtures[id].has_profile ? 0.7f : 0);
+            s.twin.area = id & 1;
             run(&s, separable);
             SSS_EACH_PIXEL(&s, x, y, i)
             {
@@ -317,6 +321,7 @@ static void materials_never_leak(void **state)
     for (int separable = 0; separable < 2; separable++) {
         sss_scene s = sss_scene_make(37, 11, 150, 61, 400);
         sss_scene_random(&s, 5);
+        s.twin.area = true;
         SSS_EACH_PIXEL(&s, x, y, i)
         {
             for (size_t c = 0; c < 3; c++)
@@ -382,6 +387,7 @@ static void bits_do_not_depend_on_threads(void **state)
     for (int separable = 0; separable < 2; separable++) {
         sss_scene s = sss_scene_make(37, 11, 300, 161, 400);
         sss_scene_random(&s, 5);
+        s.twin.area = true;
         size_t bytes = 3 * s.n * sizeof(float);
         float *first = sss_planes(3 * s.n);
         run(&s, separable);
@@ -401,6 +407,7 @@ static void crop_gives_the_same_bits(void **state)
     for (int separable = 0; separable < 2; separable++) {
         sss_scene whole = sss_scene_make(0, 0, 320, 96, 300), part = sss_scene_make(64, 8, 192, 72, 300);
         sss_scene_random(&whole, 12);
+        whole.twin.area = part.twin.area = true;
         memcpy(part.twin.frame.camera.centre, whole.twin.frame.camera.centre, sizeof(float[2]));
         SSS_EACH_PIXEL(&part, x, y, to)
         {
