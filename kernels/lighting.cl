@@ -15,7 +15,7 @@ typedef floatv widev;
 #endif
 
 enum { POST, PRE_POST };
-enum { DISNEY, LAMBERT };
+enum { DISNEY, LAMBERT, SG };
 enum { GGX };
 enum { EXIT_IN_SSS, EXIT_IN_LIGHTING };
 enum { OPAQUE, THIN, THICK, BEER_LAMBERT };
@@ -29,6 +29,9 @@ typedef struct surface_t {
     widev wide_n[3], nw;     /* the normal again; z n.w */
     floatv z, nv;            /* depth; n.v */
     floatv albedo[3], thickness, roughness, specular, metallic;
+    floatv radius;           /* of curvature, metres; at most 1e6 */
+    floatv bent[3][3];       /* the normal that each channel's scattering sees */
+    sg_t sg[3];              /* of a material with SG */
 } surface_t;
 
 typedef struct ray_t {
@@ -40,7 +43,7 @@ typedef struct ray_t {
 /* F_dt(c) = 1 - (1 - |c|)^5 / 2, Golubev 2018 after Burley 2015. */
 static inline floatv transmit(int diffuse, floatv c)
 {
-    if (diffuse == LAMBERT)
+    if (diffuse != DISNEY)
         return 1.0f;
     floatv a = fmax(1.0f - fabs(c), 0.0f), a2 = a * a;
     return fma(-0.5f * a2 * a2, a, 1.0f);
@@ -158,32 +161,80 @@ static inline void through(constant material_t *m, const surface_t *s, const ray
     }
 }
 
+/* Whether light scatters on its way in, as spherical Gaussians; the graph's check saw to it that curvature is there. */
+static inline int scatters(constant material_t *m)
+{
+    return HAS_curvature && m->has_profile && m->shading_diffuse == SG;
+}
+
+/* Per channel the sharpness, and the normal: a bump of variance u keeps u/(u + v) of its height under a Gaussian of variance v, so
+ * that is how far the normal stays the shading normal. u is the material's, and a pixel's own where that is larger. */
+static inline void scatter_surface(constant material_t *m, surface_t *s, constant frame_t *f,
+                                   global const float *curvature, global const float *smooth_normal, int at)
+{
+    floatv pixel = s->z * (1e3f / f->camera.focal[0]), bend = rl_load(curvature, at), smooth[3];
+    floatv u = fma(pixel, pixel * (1.0f / 12.0f), m->material_normal_detail_mm * m->material_normal_detail_mm);
+    for (int i = 0; i < 3 && HAS_smooth_normal; i++)
+        smooth[i] = rl_load(smooth_normal, at + i * f->plane);
+    s->radius = 1.0f / fmax(fabs(bend), 1e-6f);
+    for (int c = 0; c < 3; c++) {
+        float d = m->profile_scatter_distance_mm[c], v = m->profile_sg_variance_mm2[c];
+        v = v >= 0.0f ? v : 7.0f * d * d; /* Burley's second moment an axis */
+        s->sg[c] = sg_make(sg_sharpness(bend, v));
+        for (int i = 0; i < 3; i++)
+            s->bent[c][i] = s->n[i];
+        if (!HAS_smooth_normal)
+            continue;
+        floatv keep = u / (u + v);
+        for (int i = 0; i < 3; i++)
+            s->bent[c][i] = mix(smooth[i], s->n[i], keep);
+        floatv inverse = rsqrt(fmax(dot3(s->bent[c], s->bent[c]), 1e-12f));
+        for (int i = 0; i < 3; i++)
+            s->bent[c][i] *= inverse;
+    }
+}
+
+/* Visibility for what scatters. The shadow that a ball casts on its own far side is in the Gaussian already, and would cut it off at
+ * the terminator: where the light's way through the object is known, a shadow that is at most twice the chord 2 r |n.l|
+ * (and 1 mm) long is taken for such a one. */
+static inline floatv scatter_visibility(const surface_t *s, const ray_t *r)
+{
+    if (!r->has_thickness)
+        return r->visibility;
+    intv own = r->shadow_thickness <= fma(4.0f * s->radius, fmax(-r->nl, 0.0f), 1e-3f);
+    return rl_select(r->visibility, 1.0f, own & (r->shadow_thickness > 0.0f));
+}
+
 /* Sums of one material over all lights: E F_in (with what comes through), and the specular radiance. */
 static inline void sum_lights(constant material_t *m, const surface_t *s, constant frame_t *f, constant light_t *lights,
                               global const float *shadow, global const float *shadow_thickness, int at, floatv *diffuse,
                               floatv *specular)
 {
     int transmits = m->has_profile && m->shading_transmission && m->profile_transmission != OPAQUE;
+    int scattered = scatters(m);
     for (int i = 0; i < f->lights; i++) {
         constant light_t *light = &lights[i];
         ray_t r;
         aim(&r, s, light, &f->camera);
-        if (!transmits && !rl_any(r.nl > 0.0f))
+        if (!transmits && !scattered && !rl_any(r.nl > 0.0f))
             continue;
         r.visibility = 1.0f;
         r.shadow_thickness = 0.0f;
         r.has_thickness = 0;
         if (HAS_shadow && light->shadow >= 0)
             r.visibility = rl_load(shadow, light->shadow * f->plane + at);
-        if (HAS_shadow_thickness && transmits && light->shadow_thickness >= 0) {
+        if (HAS_shadow_thickness && (transmits || scattered) && light->shadow_thickness >= 0) {
             r.shadow_thickness = rl_load(shadow_thickness, light->shadow_thickness * f->plane + at);
             r.has_thickness = 1;
         }
         floatv entered = r.falloff * transmit(m->shading_diffuse, r.nl);
         floatv lit = r.falloff * r.visibility * fmax(r.nl, 0.0f);
         floatv front = entered * r.visibility * fmax(r.nl, 0.0f);
-        for (int c = 0; c < 3; c++)
+        for (int c = 0; c < 3; c++) {
+            if (scattered)
+                front = r.falloff * scatter_visibility(s, &r) * sg_irradiance(&s->sg[c], dot3(s->bent[c], r.l));
             diffuse[c] += light->intensity[c] * front;
+        }
         if (transmits && rl_any(r.nl < 0.0f)) {
             floatv back = fmax(-r.nl, 0.0f), t[3];
             through(m, s, &r, back, t);
@@ -221,7 +272,7 @@ static inline void shade(constant material_t *m, surface_t *s, constant frame_t 
     if (!m->has_profile || m->shading_exit_transmission == EXIT_IN_LIGHTING)
         scale *= transmit(m->shading_diffuse, s->nv);
     for (int c = 0; c < 3; c++) {
-        if (!m->has_profile)
+        if (!m->has_profile || scatters(m))
             lit[c] = fma(sum[c] * scale, s->albedo[c], lit[c]);
         else
             diffuse[c] = sum[c] * scale * (m->profile_texturing == PRE_POST ? sqrt(s->albedo[c]) : 1.0f);
@@ -231,8 +282,8 @@ static inline void shade(constant material_t *m, surface_t *s, constant frame_t 
 kernel void lighting(global const float *albedo, global const float *normal, global const float *depth,
                      global const uint *stencil, global const float *thickness, global const float *shadow,
                      global const float *shadow_thickness, global const float *roughness, global const float *specular,
-                     global const float *metallic, global const float *emission, global float *diffuse,
-                     global float *lit, constant frame_t *f, constant material_t *materials, constant light_t *lights)
+                     global const float *metallic, global const float *emission, global const float *curvature,
+                     global const float *smooth_normal, global float *diffuse, global float *lit, constant frame_t *f, constant material_t *materials, constant light_t *lights)
 {
     int x = RL_W * (int)get_global_id(0), y = (int)get_global_id(1), at = rl_index(f, x, y);
     uintv id = rl_load_id(stencil, at);
@@ -257,6 +308,8 @@ kernel void lighting(global const float *albedo, global const float *normal, glo
         s.roughness = given(m->material_roughness, HAS_roughness, roughness, at, 0.5f);
         s.specular = given(m->material_specular, HAS_specular, specular, at, 0.04f);
         s.metallic = given(m->material_metallic, HAS_metallic, metallic, at, 0.0f);
+        if (scatters(m))
+            scatter_surface(m, &s, f, curvature, smooth_normal, at);
         shade(m, &s, f, lights, shadow, shadow_thickness, at, d, l);
         for (int c = 0; c < 3; c++) {
             out_diffuse[c] = rl_select(out_diffuse[c], d[c], mask);

@@ -12,8 +12,10 @@
     M_ENUM(texturing, "post|pre_post", 0, "albedo on the way out, or its square root on both ways",          \
            .source = "d'Eon 2007")
 #define RL_ROW_DIFFUSE                                                                                       \
-    M_ENUM(diffuse, "disney|lambert", 0, "how light crosses the surface, on the way in and on the way out",  \
-           .source = "Burley 2015")
+    M_ENUM(diffuse, "disney|lambert|sg", 0,                                                                  \
+           "how light crosses the surface, on the way in and on the way out; sg: as lambert, and what has a "    \
+           "profile scatters in the lighting, by curvature",                                                 \
+           .source = "Burley 2015; MJP")
 #define RL_ROW_EXIT_TRANSMISSION                                                                             \
     M_ENUM(exit_transmission, "sss|lighting", 0,                                                             \
            "where the way out is applied: behind the filter, or before it as in the talk",                   \

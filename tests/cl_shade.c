@@ -248,14 +248,15 @@ static bool read_back(launch *l, const shade_run *run)
 bool shade_execute(shade_run *run)
 {
     bool ok = false;
-    char path[256];
+    char path[256], prelude[256];
     rl_str text = {0};
     launch l = {0};
     cl_int bad = 0;
     snprintf(path, sizeof path, "kernels/%s", run->pass->kernel);
+    snprintf(prelude, sizeof prelude, "kernels/%s", run->pass->kernel_prelude ? run->pass->kernel_prelude : "");
     add_prelude(&text, run);
     if (!shade_device() || !add_file(&text, "kernels/shared.h") || !add_file(&text, "kernels/common.cl") ||
-        !add_file(&text, path))
+        (run->pass->kernel_prelude && !add_file(&text, prelude)) || !add_file(&text, path))
         goto done;
     l.program = build(rl_str_text(&text), lanes_of(run));
     if (!l.program)
