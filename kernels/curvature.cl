@@ -8,7 +8,7 @@
 #define CHORD_SINE 0.5f
 
 /* Where all neighbours lie in one line, the fit knows the curvature along it only: this share of the trace decides what a line is. */
-#define RIDGE 1e-4f
+#define RIDGE 1e-5f
 
 typedef struct fit_t {
     floatv n[3], t[3], b[3];     /* normal, tangents */
