@@ -168,7 +168,7 @@ static inline int scatters(constant material_t *m)
 }
 
 /* Per channel the sharpness, and the normal: a bump of variance u keeps u/(u + v) of its height under a Gaussian of variance v, so
- * that is how far the normal stays the shading normal. u is the material's, and a pixel's own where that is larger. */
+ * that is how far the normal stays the shading normal. u is the material's and the pixel's own. */
 static inline void scatter_surface(constant material_t *m, surface_t *s, constant frame_t *f,
                                    global const float *curvature, global const float *smooth_normal, int at)
 {

@@ -8,8 +8,9 @@ typedef struct curvature_params {
 } curvature_params;
 
 static const rl_param params[] = {
-    P(curvature_params, RL_F32, radius_mm, 1e-3, 1e4, 3, "mm",
-      "radius of the window that curvature and smooth normal are taken from; at least 1 pixel, at most 64"),
+    P(curvature_params, RL_F32, radius_mm, 1e-3, 1e4, 6, "mm",
+      "radius of the window that curvature and smooth normal are taken from, about as far as light scatters; at least 1 "
+      "pixel, at most 64"),
 };
 RL_PARAMS_MATCH(curvature_params, 1);
 
@@ -20,7 +21,7 @@ static const rl_port ports[] = {
     {"curvature", RL_WRITE, RL_SCALAR,
      .help = "mean curvature, 1/m, convex positive: 1/R on a sphere, 1/(2R) on a cylinder; 0 where unknown",
      .any_layout = true},
-    {"smooth_normal", RL_WRITE, RL_NORMAL, .help = "mean of the normals of the window; 0 where empty",
+    {"smooth_normal", RL_WRITE, RL_NORMAL, .help = "mean of the normals of the window, a blur with standard deviation 0.54 radius_mm; 0 where empty",
      .any_layout = true},
 };
 

@@ -31,9 +31,9 @@ static const rl_param material_keys[] = {
     M(RL_F32, metallic, 0, 1, -1, "ratio",
       "1: albedo is the specular colour and nothing is diffuse; not given: the metallic layer, else 0",
       .no_default = true),
-    M(RL_F32, normal_detail_mm, 0, 1e4, 0.5, "mm",
-      "diffuse: sg with a smooth_normal: size of the normal map's bumps, as a standard deviation; bumps below the "
-      "scattering distance soften, a channel at a time",
+    M(RL_F32, normal_detail_mm, 0, 1e4, 3, "mm",
+      "diffuse: sg with a smooth_normal: size, as a standard deviation, of what that leaves out of the normal; a channel "
+      "that scatters farther sees more of the smooth one",
       .source = "d'Eon and Luebke 2007; MJP"),
 };
 
