@@ -31,7 +31,8 @@ typedef struct surface_t {
     floatv albedo[3], thickness, roughness, specular, metallic;
     floatv radius;           /* of curvature, metres; at most 1e6 */
     floatv bent[3][3];       /* the normal that each channel's scattering sees */
-    sg_t sg[3];              /* of a material with SG */
+    sg_t sg[3];              /* of a material with SG, and the sharpness */
+    floatv sharpness[3];
 } surface_t;
 
 typedef struct ray_t {
@@ -180,7 +181,8 @@ static inline void scatter_surface(constant material_t *m, surface_t *s, constan
     for (int c = 0; c < 3; c++) {
         float d = m->profile_scatter_distance_mm[c], v = m->profile_sg_variance_mm2[c];
         v = v >= 0.0f ? v : 7.0f * d * d; /* Burley's second moment an axis */
-        s->sg[c] = sg_make(sg_sharpness(bend, v));
+        s->sharpness[c] = sg_sharpness(bend, v);
+        s->sg[c] = sg_make(s->sharpness[c]);
         for (int i = 0; i < 3; i++)
             s->bent[c][i] = s->n[i];
         if (!HAS_smooth_normal)
@@ -251,6 +253,23 @@ static inline void sum_lights(constant material_t *m, const surface_t *s, consta
     }
 }
 
+/* Ambient irradiance times F_in: 1, or for Disney's the mean of F_dt over evenly bright sky, 41/42. There is no occlusion, and none
+ * of it comes through from the back. */
+static inline void add_ambient(constant material_t *m, const surface_t *s, constant ambient_t *ambient, floatv *sum)
+{
+    float entered = m->shading_diffuse == DISNEY ? 41.0f / 42.0f : 1.0f;
+    int scattered = scatters(m);
+    for (int c = 0; c < 3; c++) {
+        const floatv *n = scattered ? s->bent[c] : s->n;
+        floatv a1 = 1.0f, a2 = 1.0f;
+        if (scattered) {
+            a1 = sg_band1(s->sharpness[c]);
+            a2 = sg_band2(s->sharpness[c], a1);
+        }
+        sum[c] += entered * (sh_irradiance(ambient, c, n, a1, a2) + lobe_irradiance(ambient, c, n, scattered, a1));
+    }
+}
+
 /* What a material gives wins over the layer of that name, which wins over the default. */
 static inline floatv given(float own, int has_layer, global const float *layer, int at, float otherwise)
 {
@@ -261,13 +280,15 @@ static inline floatv given(float own, int has_layer, global const float *layer, 
 
 /* One material for a whole vector: what enters (`diffuse`) and what is complete (`lit`). */
 static inline void shade(constant material_t *m, surface_t *s, constant frame_t *f, constant light_t *lights,
-                         global const float *shadow, global const float *shadow_thickness, int at, floatv *diffuse,
-                         floatv *lit)
+                         constant ambient_t *ambient, global const float *shadow,
+                         global const float *shadow_thickness, int at, floatv *diffuse, floatv *lit)
 {
     floatv sum[3] = {0.0f, 0.0f, 0.0f};
     for (int c = 0; c < 3; c++)
         lit[c] = diffuse[c] = 0.0f;
     sum_lights(m, s, f, lights, shadow, shadow_thickness, at, sum, lit);
+    if (ambient->on)
+        add_ambient(m, s, ambient, sum);
     floatv scale = (1.0f / RL_PI) * (1.0f - s->metallic);
     if (!m->has_profile || m->shading_exit_transmission == EXIT_IN_LIGHTING)
         scale *= transmit(m->shading_diffuse, s->nv);
@@ -283,7 +304,8 @@ kernel void lighting(global const float *albedo, global const float *normal, glo
                      global const uint *stencil, global const float *thickness, global const float *shadow,
                      global const float *shadow_thickness, global const float *roughness, global const float *specular,
                      global const float *metallic, global const float *emission, global const float *curvature,
-                     global const float *smooth_normal, global float *diffuse, global float *lit, constant frame_t *f, constant material_t *materials, constant light_t *lights)
+                     global const float *smooth_normal, global float *diffuse, global float *lit, constant frame_t *f, constant material_t *materials, constant light_t *lights,
+                     constant ambient_t *ambient)
 {
     int x = RL_W * (int)get_global_id(0), y = (int)get_global_id(1), at = rl_index(f, x, y);
     uintv id = rl_load_id(stencil, at);
@@ -310,7 +332,7 @@ kernel void lighting(global const float *albedo, global const float *normal, glo
         s.metallic = given(m->material_metallic, HAS_metallic, metallic, at, 0.0f);
         if (scatters(m))
             scatter_surface(m, &s, f, curvature, smooth_normal, at);
-        shade(m, &s, f, lights, shadow, shadow_thickness, at, d, l);
+        shade(m, &s, f, lights, ambient, shadow, shadow_thickness, at, d, l);
         for (int c = 0; c < 3; c++) {
             out_diffuse[c] = rl_select(out_diffuse[c], d[c], mask);
             if (HAS_emission)

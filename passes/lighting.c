@@ -1,8 +1,9 @@
-/* Direct light on the G-buffer: point, spot and directional lights, Lambert's or Disney's diffuse
+/* Light on the G-buffer: point, spot and directional lights, unshadowed ambient light, Lambert's or Disney's diffuse
  * transmission, GGX specular, translucency through a slab.
  *
  * Golubev 2018 (transmission at entry and exit, texturing modes, thin and thick slabs), Helix (Beer-Lambert),
- * MJP (scattering as spherical Gaussians: the irradiance is complete, and goes into `lit`),
+ * MJP (scattering as spherical Gaussians: the irradiance is complete, and goes into `lit`), Ramamoorthi and Hanrahan 2001
+ * (irradiance of spherical harmonics),
  * Walter 2007 and Heitz 2014 (GGX, height-correlated Smith), Schlick 1994 (Fresnel). */
 #include "passes/shading_rows.h"
 
@@ -69,7 +70,7 @@ static const rl_step steps[] = {{"lighting", .domain = RL_EVERY_VECTOR}};
 
 const rl_pass rl_pass_lighting = {
     .name = "lighting",
-    .help = "direct light: diffuse transmission, specular reflection, translucency",
+    .help = "direct and ambient light: diffuse transmission, specular reflection, translucency",
     .source = "Golubev 2018; Helix; Walter 2007; Heitz 2014",
     .kernel = "lighting.cl",
     .kernel_prelude = "sg.cl",
@@ -79,4 +80,5 @@ const rl_pass rl_pass_lighting = {
     .ports = RL_ARRAY(ports),
     .steps = RL_ARRAY(steps),
     .lights = true,
+    .ambient = true,
 };

@@ -9,6 +9,7 @@
  *     constant frame_t *       size, number, cameras            (kernels/shared.h)
  *     constant material_t *    one entry a dense stencil index  (generated: every registered pass's rows)
  *     constant light_t *       when .lights is set
+ *     constant ambient_t *     when .ambient is set
  *     constant float *         when .tables is set: what the host computed
  */
 #ifndef RL_MODEL_PASS_H
@@ -162,6 +163,7 @@ typedef struct rl_pass {
         size_t n;
     } steps;
     bool lights; /* the kernel gets the lights, and the run the shadow layers that they use */
+    bool ambient; /* the kernel gets the ambient light */
     /* Computes constant tables from parameters and materials, in double, into `arena`; NULL = none. Pure. */
     rl_code (*tables)(const rl_pass_input *in, rl_arena *arena, rl_tables *out, rl_error *err);
     const void *data; /* for .tables of a pass that is built at run time; the engine does not look at it */
