@@ -7,7 +7,7 @@
 #   make bench       kernels and codecs against their peers
 #   make install     PREFIX=/usr/local: program, library, headers, relit.pc, configs, kernels
 #   make deps        Debian packages
-#   make format      clang-format; make layers: includes point one way only
+#   make format      clang-format 14 (make format-check only looks); make layers: includes point one way only
 
 BUILD   ?= build
 PREFIX  ?= /usr/local
@@ -26,6 +26,15 @@ CPPFLAGS += -I. $(shell pkg-config --cflags $(PKGS) 2>/dev/null)
 LDFLAGS  += $(SAN) -pthread -Wl,--as-needed
 LIBS      = $(shell pkg-config --libs $(PKGS) OpenColorIO) -lOpenCL -lstdc++ -ldl -lm
 
+# `make V=1` shows whole commands.
+ifeq ($(V),1)
+say =
+Q   =
+else
+say = @echo "  $(1)"
+Q   = @
+endif
+
 # ---- what is built -------------------------------------------------------------------------------------------
 
 # OpenImageIO takes a quarter of a second to load: its shim is a module of its own, loaded on first use.
@@ -38,24 +47,28 @@ LIB_O   := $(LIB_C:%.c=$(BUILD)/%.o) $(LIB_CXX:%.cc=$(BUILD)/%.o) $(BUILD)/kerne
 TOOL_O  := $(TOOL_C:%.c=$(BUILD)/%.o)
 MAIN_O  := $(BUILD)/graph/tool/relit.o
 TESTS   := $(patsubst tests/%.c,$(BUILD)/tests/%,$(wildcard tests/test_*.c))
+SCRIPTS := $(wildcard tests/test_*.sh)
 HELP_O  := $(patsubst tests/%.c,$(BUILD)/tests/%.o,$(filter-out tests/test_%.c tests/bench_%.c tests/example.c,$(wildcard tests/*.c)))
 
 all: $(BUILD)/relit $(BUILD)/librelit.a $(BUILD)/librelit.so $(BUILD)/relit_oiio.so
 
 $(BUILD)/%.o: %.c
 	@mkdir -p $(@D)
-	$(CC) $(CPPFLAGS) $(CFLAGS) -MMD -MP -c $< -o $@
+	$(call say,cc   $<)
+	$(Q)$(CC) $(CPPFLAGS) $(CFLAGS) -MMD -MP -c $< -o $@
 
 $(BUILD)/%.o: %.cc
 	@mkdir -p $(@D)
-	$(CXX) $(CPPFLAGS) $(CXXFLAGS) -MMD -MP -c $< -o $@
+	$(call say,c++  $<)
+	$(Q)$(CXX) $(CPPFLAGS) $(CXXFLAGS) -MMD -MP -c $< -o $@
 
 $(BUILD)/librelit.a: $(LIB_O)
 	@rm -f $@
 	@ar rcs $@ $^
 
 $(BUILD)/librelit.so: $(LIB_O)
-	$(CC) $(LDFLAGS) -shared -Wl,-soname,librelit.so -o $@ $^ $(LIBS)
+	$(call say,link $@)
+	$(Q)$(CC) $(LDFLAGS) -shared -Wl,-soname,librelit.so -o $@ $^ $(LIBS)
 
 # All of the tool but main(): tests call it in their own process.
 $(BUILD)/tool.a: $(filter-out $(MAIN_O),$(TOOL_O))
@@ -63,10 +76,12 @@ $(BUILD)/tool.a: $(filter-out $(MAIN_O),$(TOOL_O))
 	@ar rcs $@ $^
 
 $(BUILD)/relit: $(MAIN_O) $(BUILD)/tool.a $(BUILD)/librelit.a
-	$(CC) $(LDFLAGS) -o $@ $^ $(LIBS)
+	$(call say,link $@)
+	$(Q)$(CC) $(LDFLAGS) -o $@ $^ $(LIBS)
 
 $(BUILD)/relit_oiio.so: $(MODULE_CXX:%.cc=$(BUILD)/%.o)
-	$(CXX) $(LDFLAGS) -shared -o $@ $^ $(shell pkg-config --libs OpenImageIO)
+	$(call say,link $@)
+	$(Q)$(CXX) $(LDFLAGS) -shared -o $@ $^ $(shell pkg-config --libs OpenImageIO)
 
 # Kernels are built into the library, so that it runs from anywhere; $RELIT_KERNELS overrides them.
 $(BUILD)/kernels.c: $(KERNELS) Makefile
@@ -80,7 +95,10 @@ $(BUILD)/kernels.c: $(KERNELS) Makefile
 	  n=0; for k in $(KERNELS); do echo "{\"$$(basename $$k)\", k$$n},"; n=$$((n+1)); done; \
 	  echo '{0, 0}};'; } > $@.tmp && mv $@.tmp $@
 $(BUILD)/kernels.o: $(BUILD)/kernels.c
-	$(CC) $(CPPFLAGS) $(CFLAGS) -c $< -o $@
+	$(Q)$(CC) $(CPPFLAGS) $(CFLAGS) -c $< -o $@
+
+# Loops over every sample of a frame: gcc vectorizes them from -O3 on.
+$(BUILD)/graph/run/ingest.o: OPT += -O3
 
 # Where `make install` puts things that are looked for at run time; a build tree finds its own first.
 $(BUILD)/graph/run/image_module.o: CPPFLAGS += -DRL_MODULE_DIR='"$(PREFIX)/lib/relit"'
@@ -106,7 +124,8 @@ $(BUILD)/tests/help.a: $(HELP_O)
 	@ar rcs $@ $^
 
 $(BUILD)/tests/%: $(BUILD)/tests/%.o $(BUILD)/tests/sanitizers.o $(BUILD)/tests/help.a $(BUILD)/tool.a $(BUILD)/librelit.a
-	$(CC) $(LDFLAGS) -o $@ $^ $(LIBS) -lcmocka
+	$(call say,link $@)
+	$(Q)$(CC) $(LDFLAGS) -o $@ $^ $(LIBS) -lcmocka
 
 # It loads the module; so does whatever writes PNG files.
 $(BUILD)/tests/test_image_file: | $(BUILD)/relit_oiio.so
@@ -115,7 +134,7 @@ test-build: all $(TESTS)
 
 test: deps
 	@$(MAKE) --no-print-directory -j2 test-build layers
-	@BUILD=$(BUILD) tests/run.sh $(TESTS)
+	@BUILD=$(BUILD) tests/run.sh $(TESTS) $(SCRIPTS)
 
 test-asan:
 	@$(MAKE) --no-print-directory -j2 BUILD=build-asan SAN="-fsanitize=address,undefined -fno-sanitize-recover=undefined" test-build
@@ -124,7 +143,7 @@ test-asan:
 # ---- the rest --------------------------------------------------------------------------------------------------
 
 DEB = build-essential pkg-config libopenexr-dev libopenimageio-dev libopencolorio-dev pocl-opencl-icd ocl-icd-opencl-dev \
-      opencl-headers libyaml-dev libjansson-dev libxxhash-dev libdeflate-dev libisal-dev libcmocka-dev libgraphviz-dev
+      opencl-headers libyaml-dev libjansson-dev libxxhash-dev libdeflate-dev libisal-dev libcmocka-dev libgraphviz-dev clang-format
 
 # Asks for root rights only when something is missing.
 deps:
@@ -153,6 +172,8 @@ VERSION := $(shell sed -n 's/^.define RL_VERSION "\(.*\)"/\1/p' graph/relit.h)
 FORMATTED = $(shell git ls-files '*.c' '*.h' '*.cc' '*.hh')
 format:
 	clang-format -i $(FORMATTED)
+format-check:
+	@tests/test_format.sh
 
 layers:
 	@tests/layers.sh
@@ -160,4 +181,4 @@ layers:
 clean:
 	rm -rf $(BUILD) build-asan
 
-.PHONY: all demo test test-build test-asan deps install format layers clean
+.PHONY: all demo test test-build test-asan deps install format format-check layers clean

@@ -153,7 +153,7 @@ rl_code rl_session_process(rl_session *session, size_t capture, long long frame,
 void rl_session_cut(rl_session *session);
 
 /* An image that the session's outputs (or `dump`) ask for, of the last processed frame: "light.diffuse".
- * Planes R, G, B and such; ids are given as floats' bits (format "id"). Valid until the next call that
+ * Planes R, G, B and such; ids, as the capture has them, are given as floats' bits (format "id"). Valid until the next call that
  * processes or closes. */
 typedef struct rl_image_view {
     int x, y, width, height; /* data window */

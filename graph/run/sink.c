@@ -99,16 +99,16 @@ typedef struct channel_list {
     rl_exr_source rows[MOST_CHANNELS];
     size_t n;
     rl_arena names;
-    bool failed;
+    bool failed, full; /* out of memory, out of rows */
 } channel_list;
 
 static void add_channel(channel_list *list, const char *layer, const char *letter, rl_exr_source source)
 {
     source.name = *layer ? rl_arena_printf(&list->names, "%s.%s", layer, letter) : rl_arena_strdup(&list->names, letter);
-    if (list->n == MOST_CHANNELS || !source.name) {
-        list->failed = true;
+    list->failed |= !source.name;
+    list->full |= list->n == MOST_CHANNELS;
+    if (list->full || list->failed)
         return;
-    }
     list->rows[list->n++] = source;
 }
 
@@ -125,7 +125,9 @@ static void add_image(channel_list *list, const rl_sink_image *image, rl_exr_pix
             s.ids = (const uint32_t *)(const void *)s.floats;
             s.floats = NULL;
         }
-        add_channel(list, image->name, letter ? letter : "V", s);
+        list->failed |= !letter;
+        if (letter)
+            add_channel(list, image->name, letter, s);
     }
 }
 
@@ -192,8 +194,13 @@ static rl_code write_exr(const char *path, const rl_sink_output *o, const rl_sin
         image.screen_width = part->screen_width;
         memcpy(image.screen_center, part->screen_center, sizeof image.screen_center);
     }
-    rl_code code = list->failed ? rl_fail_file(err, RL_E_MEMORY, path, "too many channels for one file")
-                                : rl_exr_write(path, &image, pool, &beyond, err);
+    rl_code code = RL_OK;
+    if (list->full)
+        code = rl_fail_file(err, RL_E_CONFIG, path, "output '%s' has more than %d channels", o->spec->name, MOST_CHANNELS);
+    else if (list->failed)
+        code = rl_fail_memory(err, n);
+    else
+        code = rl_exr_write(path, &image, pool, &beyond, err);
     *clamped += beyond;
     rl_arena_free(&list->names);
     rl_free(list);
@@ -206,9 +213,10 @@ rl_code rl_sink_write(const char *path, const rl_sink_output *output, const rl_s
     region r;
     float *coverage = NULL;
     rl_arena arena = {0};
-    rl_code code = crop_region(frame, &r, err);
+    const char *folder = rl_path_folder(&arena, path);
+    rl_code code = folder ? crop_region(frame, &r, err) : rl_fail_memory(err, strlen(path));
     if (!code)
-        code = rl_folder_make(rl_path_folder(&arena, path), err);
+        code = rl_folder_make(folder, err);
     if (!code)
         code = make_coverage(frame, &r, pool, &coverage, err);
     if (!code && !strcmp(rl_path_extension(path), ".exr"))
