@@ -1,6 +1,6 @@
-/* How much the surface bends: the mean curvature, (1/R1 + 1/R2)/2, from normals and depth. What spherical Gaussians scale
- * their width by (MJP), measured in view space and not with screen derivatives, so that it does not depend on the
- * pixel's size. */
+/* How much the surface bends: the mean curvature, (1/R1 + 1/R2)/2, from normals and depth. What spherical
+ * Gaussians scale their width by (MJP), measured in view space and not with screen derivatives, so that it
+ * does not depend on the pixel's size. */
 #include "graph/model/pass.h"
 
 typedef struct curvature_params {
@@ -9,8 +9,7 @@ typedef struct curvature_params {
 
 static const rl_param params[] = {
     P(curvature_params, RL_F32, radius_mm, 1e-3, 1e4, 6, "mm",
-      "radius of the window that curvature and smooth normal are taken from, about as far as light scatters; at least 1 "
-      "pixel, at most 64"),
+      "radius of the window, about as far as light scatters; 1 to 64 pixels"),
 };
 RL_PARAMS_MATCH(curvature_params, 1);
 
@@ -21,7 +20,9 @@ static const rl_port ports[] = {
     {"curvature", RL_WRITE, RL_SCALAR,
      .help = "mean curvature, 1/m, convex positive: 1/R on a sphere, 1/(2R) on a cylinder; 0 where unknown",
      .any_layout = true},
-    {"smooth_normal", RL_WRITE, RL_NORMAL, .help = "mean of the normals of the window, a blur with standard deviation 0.54 radius_mm; 0 where empty",
+    {"smooth_normal", RL_WRITE, RL_NORMAL,
+     .help =
+         "mean of the normals of the window, a blur with standard deviation 0.54 radius_mm; 0 where empty",
      .any_layout = true},
 };
 

@@ -33,8 +33,7 @@ static const rl_param material_keys[] = {
       "1: albedo is the specular colour and nothing is diffuse; not given: the metallic layer, else 0",
       .no_default = true),
     M(RL_F32, normal_detail_mm, 0, 1e4, 3, "mm",
-      "diffuse: sg with a smooth_normal: size, as a standard deviation, of what that leaves out of the normal; a channel "
-      "that scatters farther sees more of the smooth one",
+      "diffuse: sg: size of the bumps that smooth_normal leaves out, as a standard deviation",
       .source = "d'Eon and Luebke 2007; MJP"),
 };
 
@@ -73,7 +72,7 @@ const rl_pass rl_pass_lighting = {
     .help = "direct and ambient light: diffuse transmission, specular reflection, translucency",
     .source = "Golubev 2018; Helix; Walter 2007; Heitz 2014",
     .kernel = "lighting.cl",
-    .kernel_prelude = "sg.cl",
+    .kernel_prelude = "sg.cl surface.cl sg_shade.cl",
     .profile_keys = RL_ARRAY(profile_keys),
     .material_keys = RL_ARRAY(material_keys),
     .shading_keys = RL_ARRAY(shading_keys),

@@ -13,8 +13,7 @@
            .source = "d'Eon 2007")
 #define RL_ROW_DIFFUSE                                                                                       \
     M_ENUM(diffuse, "disney|lambert|sg", 0,                                                                  \
-           "how light crosses the surface, on the way in and on the way out; sg: as lambert, and what has a "    \
-           "profile scatters in the lighting, by curvature",                                                 \
+           "how light crosses the surface, in and out; sg: as lambert, and profiles scatter in the lighting",  \
            .source = "Burley 2015; MJP")
 #define RL_ROW_EXIT_TRANSMISSION                                                                             \
     M_ENUM(exit_transmission, "sss|lighting", 0,                                                             \

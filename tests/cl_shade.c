@@ -79,6 +79,20 @@ static bool add_file(rl_str *s, const char *path)
     return true;
 }
 
+/* Names separated by spaces; NULL = none. */
+static bool add_preludes(rl_str *s, const char *names)
+{
+    bool ok = true;
+    while (names && *names && ok) {
+        char path[256];
+        int n = (int)strcspn(names, " ");
+        snprintf(path, sizeof path, "kernels/%.*s", n, names);
+        ok = add_file(s, path);
+        names += n + (int)strspn(names + n, " ");
+    }
+    return ok;
+}
+
 /* ---- the device ------------------------------------------------------------------------------------------
  */
 
@@ -251,15 +265,14 @@ static bool read_back(launch *l, const shade_run *run)
 bool shade_execute(shade_run *run)
 {
     bool ok = false;
-    char path[256], prelude[256];
+    char path[256];
     rl_str text = {0};
     launch l = {0};
     cl_int bad = 0;
     snprintf(path, sizeof path, "kernels/%s", run->pass->kernel);
-    snprintf(prelude, sizeof prelude, "kernels/%s", run->pass->kernel_prelude ? run->pass->kernel_prelude : "");
     add_prelude(&text, run);
     if (!shade_device() || !add_file(&text, "kernels/shared.h") || !add_file(&text, "kernels/common.cl") ||
-        (run->pass->kernel_prelude && !add_file(&text, prelude)) || !add_file(&text, path))
+        !add_preludes(&text, run->pass->kernel_prelude) || !add_file(&text, path))
         goto done;
     l.program = build(rl_str_text(&text), lanes_of(run));
     if (!l.program)

@@ -1,4 +1,5 @@
-/* Ambient light: harmonics, lobes and maps against numerical integrals; what lighting and the pipeline make of them. */
+/* Ambient light: harmonics, lobes and maps against numerical integrals; what lighting and the pipeline make
+ * of them. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -32,7 +33,8 @@ static void random_unit(uint64_t *seed, double *v)
     v[2] = z;
 }
 
-/* ---- integrals ------------------------------------------------------------------------------------------- */
+/* ---- integrals -------------------------------------------------------------------------------------------
+ */
 
 /* Two tangents of a unit vector. */
 static void tangents(const double *n, double *t, double *b)
@@ -55,9 +57,10 @@ static void around(const double *n, double cosine, double turn, double *out)
         out[i] = cosine * n[i] + sine * (cos(turn) * t[i] + sin(turn) * b[i]);
 }
 
-/* Midpoint sum over directions, spaced evenly in a Gaussian's own share: f(v) averaged with the normalized Gaussian around n. */
-static double gaussian_mean(double sharpness, const double *n, double (*f)(const void *, const double *), const void *ctx, int steps,
-                            int turns)
+/* Midpoint sum over directions, spaced evenly in a Gaussian's own share: f(v) averaged with the normalized
+ * Gaussian around n. */
+static double gaussian_mean(double sharpness, const double *n, double (*f)(const void *, const double *),
+                            const void *ctx, int steps, int turns)
 {
     double sum = 0;
     for (int i = 0; i < steps; i++) {
@@ -81,7 +84,8 @@ static double radiance(const void *ctx, const double *v)
     return sum;
 }
 
-/* Irradiance of the harmonics at a normal: the cosine-weighted sum over its hemisphere, spaced evenly in cos^2. */
+/* Irradiance of the harmonics at a normal: the cosine-weighted sum over its hemisphere, spaced evenly in
+ * cos^2. */
 static double sky(const void *ctx, const double *n)
 {
     double sum = 0;
@@ -101,7 +105,8 @@ static void harmonics_are_orthonormal(void **state)
     (void)state;
     for (int i = 0; i < 400; i++) {
         for (int j = 0; j < 32; j++) {
-            double z = (i + 0.5) / 200 - 1, phi = 2 * pi * (j + 0.5) / 32, r = sqrt(1 - z * z), b[RL_AMBIENT_BANDS];
+            double z = (i + 0.5) / 200 - 1, phi = 2 * pi * (j + 0.5) / 32, r = sqrt(1 - z * z),
+                   b[RL_AMBIENT_BANDS];
             rl_ambient_basis((double[]){r * cos(phi), r * sin(phi), z}, b);
             for (int a = 0; a < RL_AMBIENT_BANDS; a++)
                 for (int c = 0; c < RL_AMBIENT_BANDS; c++)
@@ -113,7 +118,8 @@ static void harmonics_are_orthonormal(void **state)
             assert_true(fabs(product[a][c] - (a == c)) < 1e-4);
 }
 
-/* ---- through the pass ------------------------------------------------------------------------------------ */
+/* ---- through the pass ------------------------------------------------------------------------------------
+ */
 
 typedef struct yard {
     shade_scene scene;
@@ -193,7 +199,8 @@ static void sky_lights_matte_and_burley(void **state)
             double n[3];
             normal_at(&t, x, 3, n);
             for (int c = 0; c < 3; c++) {
-                assert_near(pixel(&t, LIGHTING_DIFFUSE, c, x, 3), sky(t.sh[c], n) / pi * (disney ? mean : 1), 2e-3);
+                assert_near(pixel(&t, LIGHTING_DIFFUSE, c, x, 3), sky(t.sh[c], n) / pi * (disney ? mean : 1),
+                            2e-3);
                 assert_true(pixel(&t, LIGHTING_LIT, c, x, 3) == 0);
             }
         }
@@ -204,11 +211,13 @@ static void sky_lights_matte_and_burley(void **state)
     assert_true(shade_execute(&t.run));
     double n[3];
     normal_at(&t, 9, 3, n);
-    assert_near(pixel(&t, LIGHTING_LIT, 1, 9, 3), sky(t.sh[1], n) / pi * pixel(&t, LIGHTING_ALBEDO, 1, 9, 3), 2e-3);
+    assert_near(pixel(&t, LIGHTING_LIT, 1, 9, 3), sky(t.sh[1], n) / pi * pixel(&t, LIGHTING_ALBEDO, 1, 9, 3),
+                2e-3);
     shade_scene_free(&t.scene);
 }
 
-/* The irradiance of the sky, averaged with the normalized Gaussian around the normal: sharpness from 1e-3 to 1e4 a row. */
+/* The irradiance of the sky, averaged with the normalized Gaussian around the normal: sharpness from 1e-3 to
+ * 1e4 a row. */
 static void sky_scatters_a_band_at_a_time(void **state)
 {
     yard t;
@@ -221,7 +230,8 @@ static void sky_scatters_a_band_at_a_time(void **state)
         double n[3];
         normal_at(&t, 5, y, n);
         for (int c = 0; c < 3; c++) {
-            double lambda = sharpness_at(&t, c, 5, y), want = gaussian_mean(lambda, n, sky, t.sh[c], 80, 16) / pi;
+            double lambda = sharpness_at(&t, c, 5, y),
+                   want = gaussian_mean(lambda, n, sky, t.sh[c], 80, 16) / pi;
             double got = pixel(&t, LIGHTING_LIT, c, 5, y) / pixel(&t, LIGHTING_ALBEDO, c, 5, y);
             worst = fmax(worst, fabs(got / want - 1));
             least = fmin(least, lambda);
@@ -234,7 +244,8 @@ static void sky_scatters_a_band_at_a_time(void **state)
     shade_scene_free(&t.scene);
 }
 
-/* ---- lobes ----------------------------------------------------------------------------------------------- */
+/* ---- lobes -----------------------------------------------------------------------------------------------
+ */
 
 typedef struct lobe_light {
     double axis[3], table[501]; /* irradiance of a flux of 1, over axis.n from -1 to 1 */
@@ -288,9 +299,11 @@ static void lobes_convolve(void **state)
                 for (int c = 0; c < 3; c++) {
                     double n[3], lambda = sharpness_at(&t, c, 5, y);
                     normal_at(&t, 5, y, n);
-                    double want = scattered ? gaussian_mean(lambda, n, from_table, &light, 60, 24) : from_table(&light, n);
+                    double want = scattered ? gaussian_mean(lambda, n, from_table, &light, 60, 24)
+                                            : from_table(&light, n);
                     double a = pixel(&t, LIGHTING_ALBEDO, c, 5, y), flux = c + 1;
-                    double got = scattered ? pixel(&t, LIGHTING_LIT, c, 5, y) / a : pixel(&t, LIGHTING_DIFFUSE, c, 5, y);
+                    double got = scattered ? pixel(&t, LIGHTING_LIT, c, 5, y) / a
+                                           : pixel(&t, LIGHTING_DIFFUSE, c, 5, y);
                     double error = fabs(got * pi / flux - want);
                     worst = fmax(worst, scattered ? error : 0);
                     plain = fmax(plain, scattered ? 0 : error);
@@ -298,12 +311,15 @@ static void lobes_convolve(void **state)
                     double l = lambda * sharpness[s] / (lambda + sharpness[s]);
                     double energy = expm1(-2 * l) / (expm1(-2 * lambda) * -expm1(-2 * sharpness[s]));
                     if (scattered)
-                        product = fmax(product, fabs(energy * twin_sg_irradiance(l, dot(light.axis, n)) - want));
+                        product =
+                            fmax(product, fabs(energy * twin_sg_irradiance(l, dot(light.axis, n)) - want));
                 }
             }
         }
     }
-    print_message("lobes: largest error %.3f of the flux behind a Gaussian, %.3f without (product rule %.2f)\n", worst, plain, product);
+    print_message(
+        "lobes: largest error %.3f of the flux behind a Gaussian, %.3f without (product rule %.2f)\n", worst,
+        plain, product);
     assert_true(plain < 0.020);
     assert_true(worst < 0.030); /* 0.015 of the convolution, 0.020 of the fit */
     assert_true(product > 3 * worst);
@@ -321,7 +337,8 @@ static void flux_of_a_lobe(void **state)
     }
 }
 
-/* ---- latitude-longitude maps ----------------------------------------------------------------------------- */
+/* ---- latitude-longitude maps -----------------------------------------------------------------------------
+ */
 
 /* A map that holds a band-limited sky gives its coefficients back, turned as the map is. */
 static void map_gives_its_harmonics_back(void **state)
@@ -376,7 +393,8 @@ static void map_shows_the_world_from_within(void **state)
     assert_direction(&turned, 0.5, 0.5, 0, 1, 0); /* counter-clockwise from above */
 }
 
-/* ---- the section ----------------------------------------------------------------------------------------- */
+/* ---- the section -----------------------------------------------------------------------------------------
+ */
 
 static rl_code parse(const char *text, rl_ambient *out, rl_error *err)
 {
@@ -413,7 +431,8 @@ static void section_is_checked(void **state)
         if (!strstr(err.text, bad[i].says))
             fail_msg("'%s' does not say '%s'", err.text, bad[i].says);
     }
-    assert_int_equal(parse("{hdri: sky.exr, up: z, rotation: 90, intensity: [1, 2, 3], sh: [1, 2, 3, 4, 5, 6, 7, 8, [9, 0, -9]], "
+    assert_int_equal(parse("{hdri: sky.exr, up: z, rotation: 90, intensity: [1, 2, 3], sh: [1, 2, 3, 4, 5, "
+                           "6, 7, 8, [9, 0, -9]], "
                            "lobes: [{axis: [0, 3, 0], sharpness: 2, amplitude: [1, 2, 3]}]}",
                            &a, &err),
                      RL_OK);

@@ -79,12 +79,13 @@ static uint32_t id_at(const fixture *t, int x, int y)
     return inside ? shade_id(t->run.images[STENCIL], f, x, y) : 0;
 }
 
-/* ---- the twin --------------------------------------------------------------------------------------------- */
+/* ---- the twin ---------------------------------------------------------------------------------------------
+ */
 
 typedef struct twin {
     double pp[3][3], np[3][3], sum[3]; /* sums of dp dp^T and dn dp^T in world space, on the tangent plane */
     bool close;                        /* a neighbour's test was decided by rounding */
-    double spread;                     /* smaller eigenvalue of pp over the trace: 0 where neighbours lie in a line */
+    double spread; /* smaller eigenvalue of pp over the trace: 0 where neighbours lie in a line */
 } twin;
 
 /* The window's radius in pixels: of the nearest point of 16 pixels. */
@@ -118,7 +119,8 @@ static void twin_add(const fixture *t, twin *w, int x, int y, int dx, int dy)
         mean[i] = n[i] + n1[i];
         p1[i] -= p[i];
     }
-    double turn = dot(n, n1), length = sqrt(dot(mean, mean) * dot(p1, p1)), sine = fabs(dot(mean, p1)) / length;
+    double turn = dot(n, n1), length = sqrt(dot(mean, mean) * dot(p1, p1)),
+           sine = fabs(dot(mean, p1)) / length;
     w->close |= fabs(turn) < 1e-5 || fabs(sine - 0.5) < 1e-4;
     if (turn <= 0 || sine > 0.5)
         return;
@@ -235,13 +237,15 @@ static void agrees_with_twin(void **state)
                 seen += id_at(&t, x, y) != 0;
                 bent += want != 0;
                 /* rounding of pp is divided by the spread, or by the ridge */
-                worst = fmax(worst, fabs(got - want) / fmax(fabs(want), 10) * fmin(spread + 1e-5, 1e-2) * 100);
+                worst =
+                    fmax(worst, fabs(got - want) / fmax(fabs(want), 10) * fmin(spread + 1e-5, 1e-2) * 100);
                 for (int c = 0; c < 3; c++)
                     worst_normal = fmax(worst_normal, fabs(get(&t, SMOOTH, c, x, y) - smooth[c]));
             }
         }
-        print_message("%dx%d, %d of %d bent: largest relative error (well spread) %.2g, of the normal %.2g (%d pixels left out)\n", sizes[i][0],
-                      sizes[i][1], bent, seen, worst, worst_normal, skipped);
+        print_message("%dx%d, %d of %d bent: largest relative error (well spread) %.2g, of the normal %.2g "
+                      "(%d pixels left out)\n",
+                      sizes[i][0], sizes[i][1], bent, seen, worst, worst_normal, skipped);
         assert_true(worst < 1e-4);
         assert_true(worst_normal < 1e-5);
         assert_true(skipped * 50 <= seen + 50);
@@ -249,7 +253,8 @@ static void agrees_with_twin(void **state)
     }
 }
 
-/* ---- known surfaces --------------------------------------------------------------------------------------- */
+/* ---- known surfaces ---------------------------------------------------------------------------------------
+ */
 
 /* A ball, or with an axis a cylinder, around `centre` (relative to the eye). */
 typedef struct shape {
@@ -276,7 +281,8 @@ static void normal_of(const shape *s, const double *p, double *n)
     normalize(n);
 }
 
-/* Draws a shape over what is there, if nearer; `bits` > 0 rounds normals to so many bits, as half files do with 11. */
+/* Draws a shape over what is there, if nearer; `bits` > 0 rounds normals to so many bits, as half files do
+ * with 11. */
 static void draw(fixture *t, const shape *s, uint32_t id, int bits)
 {
     const frame_t *f = &t->run.frame;
@@ -327,7 +333,8 @@ static double seen_angle(const fixture *t, int x, int y)
     return -dot(n, p) / sqrt(dot(p, p));
 }
 
-/* Largest relative error of the curvature over the pixels of `id` that face the camera by at least `facing`. */
+/* Largest relative error of the curvature over the pixels of `id` that face the camera by at least `facing`.
+ */
 static double error_of(const fixture *t, uint32_t id, double want, double facing, int *seen)
 {
     const frame_t *f = &t->run.frame;
@@ -369,8 +376,9 @@ static void balls_and_cylinders_have_theirs(void **state)
             t.radius_mm = (float)(1000 * radii[i] / 4);
             assert_true(shade_execute(&t.run));
             double worst = error_of(&t, 2, want, 0.05, &seen);
-            print_message("%s %s of radius %g m: largest error %.1g over %d pixels\n", s.hollow ? "hollow" : "full",
-                          kind / 2 ? "cylinder" : "ball", radii[i], worst, seen);
+            print_message("%s %s of radius %g m: largest error %.1g over %d pixels\n",
+                          s.hollow ? "hollow" : "full", kind / 2 ? "cylinder" : "ball", radii[i], worst,
+                          seen);
             assert_true(seen > 300);
             assert_true(worst < 5e-3); /* the ridge's weight, on cylinders seen along their axis */
         }
@@ -421,7 +429,8 @@ static void planes_have_none(void **state)
     done(&t);
 }
 
-/* In front of a large ball floats a small one, of the same material or of another: neither sees the other's. */
+/* In front of a large ball floats a small one, of the same material or of another: neither sees the other's.
+ */
 static void borders_do_not_leak(void **state)
 {
     (void)state;
@@ -437,7 +446,8 @@ static void borders_do_not_leak(void **state)
         draw(&t, &small, other, 0);
         t.radius_mm = 6;
         assert_true(shade_execute(&t.run));
-        /* With one material the two are told apart by curvature itself; the margin keeps them apart for the test. */
+        /* With one material the two are told apart by curvature itself; the margin keeps them apart for the
+         * test. */
         const frame_t *f = &t.run.frame;
         double worst = 0;
         seen[0] = seen[1] = 0;
@@ -478,7 +488,8 @@ static void half_normals_cost_little(void **state)
         t.radius_mm = i ? 3 : 0.1f;
         assert_true(shade_execute(&t.run));
         double worst = error_of(&t, 2, 10, 0.3, &seen);
-        print_message("half normals, window %g mm: largest error %.2g over %d pixels\n", (double)t.radius_mm, worst, seen);
+        print_message("half normals, window %g mm: largest error %.2g over %d pixels\n", (double)t.radius_mm,
+                      worst, seen);
         if (i)
             assert_true(worst < 0.03);
     }

@@ -1,4 +1,5 @@
-/* Spherical Gaussians: the irradiance fit against numerical integrals, and what lighting makes of a material with diffuse: sg. */
+/* Spherical Gaussians: the irradiance fit against numerical integrals, and what lighting makes of a material
+ * with diffuse: sg. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -29,28 +30,32 @@ static double cosine(int i)
 /* ---- the integral -----------------------------------------------------------------------------------------
  */
 
-/* Light of direction l on a ball of radius r (mm), blurred by a Gaussian of the chord d with variance v an axis, exp(-d^2/2v),
- * normalized over the ball: what arrives at the point with normal n, mu = n.l. Midpoint sums over polar angle (spaced so that each
- * step carries the same part of the kernel) and azimuth. */
+/* Light of direction l on a ball of radius r (mm), blurred by a Gaussian of the chord d with variance v an
+ * axis, exp(-d^2/2v), normalized over the ball: what arrives at the point with normal n, mu = n.l. Midpoint
+ * sums over polar angle (spaced so that each step carries the same part of the kernel) and azimuth. */
 static double blurred(double r, double v, double mu)
 {
-    double k = 2 * r * r / v, sum = 0, side = sqrt(fmax(1 - mu * mu, 0)); /* kernel: exp(-k s), s = sin^2(theta/2) in 0…1 */
+    double k = 2 * r * r / v, sum = 0,
+           side = sqrt(fmax(1 - mu * mu, 0)); /* kernel: exp(-k s), s = sin^2(theta/2) in 0…1 */
     for (int i = 0; i < STEPS; i++) {
-        double part = (i + 0.5) / STEPS, s = -log1p(part * expm1(-k)) / k, c = 1 - 2 * s, sine = 2 * sqrt(s * (1 - s));
+        double part = (i + 0.5) / STEPS, s = -log1p(part * expm1(-k)) / k, c = 1 - 2 * s,
+               sine = 2 * sqrt(s * (1 - s));
         for (int j = 0; j < TURNS; j++)
             sum += fmax(c * mu + sine * side * cos(pi * (j + 0.5) / TURNS), 0);
     }
     return sum / (STEPS * TURNS);
 }
 
-/* The kernel's functions at every pair of the tables: PAIRS irradiances, then PAIRS sharpnesses of curvature lambda and variance 2. */
+/* The kernel's functions at every pair of the tables: PAIRS irradiances, then PAIRS sharpnesses of curvature
+ * lambda and variance 2. */
 static void run_kernel(float *out)
 {
-    static const char entry[] = "kernel void fit(global const float *in, global float *out)\n"
-                                "{ int i = get_global_id(0), n = get_global_size(0) / 2;\n"
-                                "  floatv a = rl_load(in, RL_W * (i % n)), mu = rl_load(in, RL_W * (i % n + n));\n"
-                                "  sg_t s = sg_make(a);\n"
-                                "  rl_store(i < n ? sg_irradiance(&s, mu) : sg_sharpness(a, 2.0f), out, RL_W * i); }\n";
+    static const char entry[] =
+        "kernel void fit(global const float *in, global float *out)\n"
+        "{ int i = get_global_id(0), n = get_global_size(0) / 2;\n"
+        "  floatv a = rl_load(in, RL_W * (i % n)), mu = rl_load(in, RL_W * (i % n + n));\n"
+        "  sg_t s = sg_make(a);\n"
+        "  rl_store(i < n ? sg_irradiance(&s, mu) : sg_sharpness(a, 2.0f), out, RL_W * i); }\n";
     static float in[2 * PAIRS];
     char *file = NULL;
     size_t size;
@@ -76,7 +81,8 @@ static void fit_is_near_the_integral(void **state)
     for (int i = 0; i < SHARPNESSES; i++) {
         double lambda = sharpness(i), mean = 0, weight = 0;
         for (int j = 0; j < ANGLES; j++) {
-            double mu = cosine(j), e = (double)got[i * ANGLES + j], want = blurred(sqrt(lambda), 1, mu), w = sin(pi * j / (ANGLES - 1));
+            double mu = cosine(j), e = (double)got[i * ANGLES + j], want = blurred(sqrt(lambda), 1, mu),
+                   w = sin(pi * j / (ANGLES - 1));
             worst = fmax(worst, fabs(e - want));
             if (lambda < 0.0999)
                 wide = fmax(wide, fabs(e - want));
@@ -85,10 +91,12 @@ static void fit_is_near_the_integral(void **state)
             mean += w * e;
             weight += w;
         }
-        worst_mean = fmax(worst_mean, fabs(mean / weight / 0.25 - 1)); /* a blur keeps the mean over all normals, 1/4 */
+        worst_mean = fmax(worst_mean,
+                          fabs(mean / weight / 0.25 - 1)); /* a blur keeps the mean over all normals, 1/4 */
     }
-    print_message("irradiance: largest error of the fit %.4f (below lambda 0.1: %.1g), of float %.1g; energy within %.1f %%\n", worst,
-                  wide, narrow, 100 * worst_mean);
+    print_message("irradiance: largest error of the fit %.4f (below lambda 0.1: %.1g), of float %.1g; energy "
+                  "within %.1f %%\n",
+                  worst, wide, narrow, 100 * worst_mean);
     assert_true(worst < 0.020);
     assert_true(wide < 1e-4);
     assert_true(narrow < 3e-6);
@@ -243,7 +251,8 @@ static void variance_defaults_to_that_of_burley(void **state)
     assert_near(second, 7, 1e-4);
     make_ball(&b);
     shade_material_set(&b.scene.materials, b.material, "profile", "sg_variance_mm2", (double[]){-1, -1, -1});
-    shade_material_set(&b.scene.materials, b.material, "profile", "scatter_distance_mm", (double[]){3, 1.2, 0.7});
+    shade_material_set(&b.scene.materials, b.material, "profile", "scatter_distance_mm",
+                       (double[]){3, 1.2, 0.7});
     shade_middle(&b, lit);
     assert_near(lit[0], unit * twin_sg_irradiance(100 / (7 * 9.0), 1), 1e-5);
     assert_near(lit[2], unit * twin_sg_irradiance(100 / (7 * 0.49), 1), 1e-5);
@@ -280,7 +289,8 @@ static void normals_soften_a_channel_at_a_time(void **state)
     shade_scene_free(&b.scene);
 }
 
-/* The far side of a ball is in the shadow of the ball itself, which must not cut the Gaussian off; a shadow from afar does. */
+/* The far side of a ball is in the shadow of the ball itself, which must not cut the Gaussian off; a shadow
+ * from afar does. */
 static void own_shadow_is_none(void **state)
 {
     ball b;
@@ -292,7 +302,8 @@ static void own_shadow_is_none(void **state)
     b.scene.lights[0].position[2] = -1;
     set_layer(&b, LIGHTING_SHADOW, 0, 0, 0);
     for (int i = 0; i < 3; i++) {
-        static const double thickness[] = {0.010, 0.020, 0.03}; /* the chord 2 r |n.l|; twice that and 1 mm is the limit */
+        static const double thickness[] = {0.010, 0.020,
+                                           0.03}; /* the chord 2 r |n.l|; twice that and 1 mm is the limit */
         set_layer(&b, LIGHTING_SHADOW_THICKNESS, thickness[i], thickness[i], thickness[i]);
         shade_middle(&b, lit);
         if (i < 2)

@@ -5,7 +5,8 @@
 
 static const double pi = 3.14159265358979323846;
 
-/* ---- reading --------------------------------------------------------------------------------------------- */
+/* ---- reading ---------------------------------------------------------------------------------------------
+ */
 
 /* One number, or three. */
 static rl_code read_rgb(const rl_value *v, const char *name, double min, double out[3], rl_error *err)
@@ -64,17 +65,20 @@ static rl_code read_lobes(const rl_value *v, rl_ambient *a, rl_error *err)
 /* Keys that only an HDRI has. */
 static rl_code read_hdri(rl_arena *arena, const rl_value *v, rl_ambient *a, rl_error *err)
 {
-    const rl_value *hdri = rl_value_get(v, "hdri"), *up = rl_value_get(v, "up"), *turn = rl_value_get(v, "rotation");
+    const rl_value *hdri = rl_value_get(v, "hdri"), *up = rl_value_get(v, "up"),
+                   *turn = rl_value_get(v, "rotation");
     const rl_value *stray = up ? up : turn;
     const char *text;
     int axis = 0;
     double degrees = 0;
     if (!hdri)
-        return stray ? rl_fail(err, RL_E_CONFIG, stray->where, "'%s' is of an hdri, and there is none", up ? "up" : "rotation")
+        return stray ? rl_fail(err, RL_E_CONFIG, stray->where, "'%s' is of an hdri, and there is none",
+                               up ? "up" : "rotation")
                      : RL_OK;
     a->hdri_where = hdri->where;
     if (!up)
-        return rl_fail(err, RL_E_CONFIG, hdri->where, "an hdri needs 'up', the world axis that points up: y or z");
+        return rl_fail(err, RL_E_CONFIG, hdri->where,
+                       "an hdri needs 'up', the world axis that points up: y or z");
     rl_code code = rl_value_text(hdri, "hdri", &text, err);
     if (!code)
         code = rl_value_word(up, "up", "y|z", &axis, err);
@@ -108,13 +112,22 @@ rl_code rl_ambient_parse(rl_arena *arena, const rl_value *v, rl_ambient *out, rl
     return code;
 }
 
-/* ---- harmonics ------------------------------------------------------------------------------------------- */
+/* ---- harmonics -------------------------------------------------------------------------------------------
+ */
 
 void rl_ambient_basis(const double d[3], double out[RL_AMBIENT_BANDS])
 {
-    double c0 = sqrt(1 / (4 * pi)), c1 = sqrt(3 / (4 * pi)), c2 = sqrt(15 / (4 * pi)), x = d[0], y = d[1], z = d[2];
-    const double values[RL_AMBIENT_BANDS] = {c0,         c1 * y,     c1 * z, c1 * x, c2 * x * y,
-                                             c2 * y * z, c2 / sqrt(12) * (3 * z * z - 1), c2 * x * z, c2 / 2 * (x * x - y * y)};
+    double c0 = sqrt(1 / (4 * pi)), c1 = sqrt(3 / (4 * pi)), c2 = sqrt(15 / (4 * pi)), x = d[0], y = d[1],
+           z = d[2];
+    const double values[RL_AMBIENT_BANDS] = {c0,
+                                             c1 * y,
+                                             c1 * z,
+                                             c1 * x,
+                                             c2 * x * y,
+                                             c2 * y * z,
+                                             c2 / sqrt(12) * (3 * z * z - 1),
+                                             c2 * x * z,
+                                             c2 / 2 * (x * x - y * y)};
     for (int i = 0; i < RL_AMBIENT_BANDS; i++)
         out[i] = values[i];
 }
@@ -133,7 +146,8 @@ unsigned long long rl_ambient_project(const rl_ambient *a, const float *const pl
 {
     unsigned long long bad = 0;
     for (int y = 0; y < height; y++) {
-        double top = cos(pi * y / height), bottom = cos(pi * (y + 1) / height), solid = 2 * pi / width * (top - bottom);
+        double top = cos(pi * y / height), bottom = cos(pi * (y + 1) / height),
+               solid = 2 * pi / width * (top - bottom);
         for (int x = 0; x < width; x++) {
             double d[3], basis[RL_AMBIENT_BANDS];
             rl_ambient_direction(a, (x + 0.5) / width, (y + 0.5) / height, d);

@@ -45,7 +45,8 @@ static size_t who_needs(const rl_materials *m, const char *key, int value)
     return 0;
 }
 
-rl_code rl_graph_check_needs(rl_arena *arena, const rl_graph *graph, const rl_materials *materials, rl_error *err)
+rl_code rl_graph_check_needs(rl_arena *arena, const rl_graph *graph, const rl_materials *materials,
+                             rl_error *err)
 {
     for (size_t n = 0; n < graph->n_nodes; n++) {
         const rl_graph_node *node = &graph->nodes[n];
@@ -56,15 +57,17 @@ rl_code rl_graph_check_needs(rl_arena *arena, const rl_graph *graph, const rl_ma
             if (!port->needed_by || node->images[p] >= 0)
                 continue;
             if (!find_need(arena, node->pass, port->needed_by, &key, &value))
-                return rl_fail(err, RL_E_INTERNAL, node->where, "pass %s: port '%s' is needed by '%s', which is no word of a shading key",
+                return rl_fail(err, RL_E_INTERNAL, node->where,
+                               "pass %s: port '%s' is needed by '%s', which is no word of a shading key",
                                node->pass->name, port->name, port->needed_by);
             size_t material = who_needs(materials, key, value);
             if (material)
                 return rl_fail(err, RL_E_CONFIG, node->where,
-                               "pass '%s' (%s): port '%s' needs an image (%s), since material '%s' has '%s': name one in `in:` or "
+                               "pass '%s' (%s): port '%s' needs an image (%s), since material '%s' has '%s': "
+                               "name one in `in:` or "
                                "give the capture a layer '%s'",
-                               node->name, node->pass->name, port->name, rl_format_name(port->format), materials->names[material],
-                               port->needed_by, port->name);
+                               node->name, node->pass->name, port->name, rl_format_name(port->format),
+                               materials->names[material], port->needed_by, port->name);
         }
     }
     return RL_OK;

@@ -148,7 +148,7 @@ typedef struct rl_pass {
     const char *help;        /* one line */
     const char *source;      /* paper, talk, equation */
     const char *kernel;      /* file in kernels/, or NULL when kernel_text is set */
-    const char *kernel_prelude; /* another file in kernels/, put in front of it; NULL = none */
+    const char *kernel_prelude; /* other files in kernels/, put in front of it: "a.cl b.cl"; NULL = none */
     const char *kernel_text; /* the program itself, for passes built at run time; named kernel_file in errors */
     const char *kernel_file;
     rl_params params;

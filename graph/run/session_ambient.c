@@ -16,13 +16,16 @@ static rl_code add_hdri(const rl_session *s, rl_ambient *a, rl_error *err)
     for (size_t c = 0; c < 3; c++)
         rgb[c] = file.planes + (file.channels >= 3 ? c * plane : 0);
     if (file.type != RL_IMAGE_HALF && file.type != RL_IMAGE_FLOAT)
-        code = rl_fail(err, RL_E_CONFIG, a->hdri_where, "%s holds integers; an hdri is linear light, half or float", a->hdri);
+        code = rl_fail(err, RL_E_CONFIG, a->hdri_where,
+                       "%s holds integers; an hdri is linear light, half or float", a->hdri);
     if (!code && file.width != 2 * file.height)
-        rl_report(s->log, RL_WARNING, a->hdri_where, "%s has %d x %d pixels; a latitude-longitude image is twice as wide as high", a->hdri,
+        rl_report(s->log, RL_WARNING, a->hdri_where,
+                  "%s has %d x %d pixels; a latitude-longitude image is twice as wide as high", a->hdri,
                   file.width, file.height);
     unsigned long long bad = code ? 0 : rl_ambient_project(a, rgb, file.width, file.height, a->sh);
     if (bad)
-        rl_report(s->log, RL_WARNING, a->hdri_where, "%s: %llu samples are NaN or infinite and count as 0", a->hdri, bad);
+        rl_report(s->log, RL_WARNING, a->hdri_where, "%s: %llu samples are NaN or infinite and count as 0",
+                  a->hdri, bad);
     rl_image_file_free(&file);
     return code;
 }
@@ -59,7 +62,8 @@ rl_code rl_session_ambient(rl_session *s, rl_error *err)
             const rl_ambient_lobe *lobe = &a.lobes[i];
             out->lobe[i].axis[c] = (float)lobe->axis[c];
             out->lobe[i].sharpness = (float)lobe->sharpness;
-            out->lobe[i].flux[c] = convert(&a, m, lobe->amplitude, c) * (float)rl_ambient_lobe_flux(lobe->sharpness);
+            out->lobe[i].flux[c] =
+                convert(&a, m, lobe->amplitude, c) * (float)rl_ambient_lobe_flux(lobe->sharpness);
         }
     }
     return RL_OK;
