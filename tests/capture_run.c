@@ -14,15 +14,14 @@
 
 #include "tests/tool_run.h"
 
-const char capture_pipeline[] =
-    "relit: 1\n"
-    "shading: {diffuse: lambert, specular: none}\n"
-    "materials: {default: {}}\n"
-    "graph:\n"
-    "  light: {pass: lighting}\n"
-    "  c: {pass: combine, in: {diffuse: light.diffuse, lit: light.lit}}\n"
-    "outputs:\n"
-    "  o: {image: c.color, file: \"{capture}.{frame:04}.exr\", type: float}\n";
+const char capture_pipeline[] = "relit: 1\n"
+                                "shading: {diffuse: lambert, specular: none}\n"
+                                "materials: {default: {}}\n"
+                                "graph:\n"
+                                "  light: {pass: lighting}\n"
+                                "  c: {pass: combine, in: {diffuse: light.diffuse, lit: light.lit}}\n"
+                                "outputs:\n"
+                                "  o: {image: c.color, file: \"{capture}.{frame:04}.exr\", type: float}\n";
 
 static char *cache;
 static rl_str said;
@@ -60,8 +59,9 @@ void capture_log_clear(void)
 
 rl_session *capture_open(const char *path, const char *pipeline, const rl_options *more)
 {
-    static const char *const dump[] = {"c.color",         "capture.depth",  "capture.normal",   "capture.stencil",
-                                       "capture.albedo", "capture.motion", "capture.thickness"};
+    static const char *const dump[] = {"c.color",          "capture.depth",  "capture.normal",
+                                       "capture.stencil",  "capture.albedo", "capture.motion",
+                                       "capture.thickness"};
     rl_options options = more ? *more : (rl_options){0};
     rl_session *s = NULL;
     rl_error err = {0};
@@ -102,7 +102,8 @@ double capture_error(const rl_image_view *image, const scene *truth, int plane, 
     for (int c = 0; c < planes; c++) {
         for (size_t i = 0; i < truth->n; i++) {
             double t = truth->plane[plane + c][i];
-            double v = (double)image->plane[c][i / (size_t)truth->width * image->stride + i % (size_t)truth->width];
+            double v =
+                (double)image->plane[c][i / (size_t)truth->width * image->stride + i % (size_t)truth->width];
             if (plane == SCENE_NORMAL && !truth->id[i])
                 continue;
             double d = fabs(v - t);

@@ -1,4 +1,5 @@
-/* Runs lighting and combine on a capture in a folder and compares what comes out with the scene. Include cmocka.h first. */
+/* Runs lighting and combine on a capture in a folder and compares what comes out with the scene. Include
+ * cmocka.h first. */
 #ifndef RL_TESTS_CAPTURE_RUN_H
 #define RL_TESTS_CAPTURE_RUN_H
 
@@ -12,15 +13,16 @@ extern const char capture_pipeline[];
 bool capture_start(void);
 void capture_stop(void);
 
-/* A session on folder/capture.yaml that keeps color, depth, normal, stencil, albedo, motion and thickness. Options that are
- * set in `more` (may be NULL) are taken over. Fails the test on an error, which it prints. */
+/* A session on folder/capture.yaml that keeps color, depth, normal, stencil, albedo, motion and thickness.
+ * Options that are set in `more` (may be NULL) are taken over. Fails the test on an error, which it prints.
+ */
 rl_session *capture_open(const char *path, const char *pipeline, const rl_options *more);
 
 /* The image of the frame that was processed last, or a failed test. */
 rl_image_view capture_image(rl_session *s, const char *name);
 
-/* The largest |image - truth| over all planes, divided by `scale` (0: by the largest truth). Empty pixels have no
- * normal to compare. */
+/* The largest |image - truth| over all planes, divided by `scale` (0: by the largest truth). Empty pixels
+ * have no normal to compare. */
 double capture_error(const rl_image_view *image, const scene *truth, int plane, int planes, double scale);
 
 /* Warnings since capture_start or capture_log_clear. */

@@ -1,6 +1,6 @@
-/* An analytic scene, in double: what a camera sees of two spheres and a floor, and how three lights light it (Lambert).
- * Everything is in metres, in a right-handed world, y up; views look down -z. Written under any convention by
- * capture_write.h. */
+/* An analytic scene, in double: what a camera sees of two spheres and a floor, and how three lights light it
+ * (Lambert). Everything is in metres, in a right-handed world, y up; views look down -z. Written under any
+ * convention by capture_write.h. */
 #ifndef RL_TESTS_CAPTURE_SCENE_H
 #define RL_TESTS_CAPTURE_SCENE_H
 
@@ -18,28 +18,49 @@ typedef struct scene_camera {
 } scene_camera;
 
 enum {
-    SCENE_ALBEDO = 0,    /* 3, linear Rec.709 */
-    SCENE_NORMAL = 3,    /* 3, world */
-    SCENE_POSITION = 6,  /* 3 */
-    SCENE_DEPTH = 9,     /* along the view axis; 0 = empty */
-    SCENE_RAY = 10,      /* length of the view ray per metre of depth */
+    SCENE_ALBEDO = 0,   /* 3, linear Rec.709 */
+    SCENE_NORMAL = 3,   /* 3, world */
+    SCENE_POSITION = 6, /* 3 */
+    SCENE_DEPTH = 9,    /* along the view axis; 0 = empty */
+    SCENE_RAY = 10,     /* length of the view ray per metre of depth */
     SCENE_THICKNESS = 11,
-    SCENE_MOTION = 12,   /* 2, pixels, x right, y down; made up */
-    SCENE_SHADOW = 14,   /* 2: key, rim; made up */
-    SCENE_COLOR = 16,    /* 3: radiance towards the camera */
+    SCENE_MOTION = 12, /* 2, pixels, x right, y down; made up */
+    SCENE_SHADOW = 14, /* 2: key, rim; made up */
+    SCENE_COLOR = 16,  /* 3: radiance towards the camera */
     SCENE_PLANES = 19
 };
 
 enum { SCENE_KEY = 1, SCENE_RIM = 2, SCENE_SUN = 4, SCENE_LIGHTS = 7 };
-#define SCENE_KEY_POSITION {0.6, 1.2, -0.4}
-#define SCENE_KEY_INTENSITY {3, 2, 1}
-#define SCENE_RIM_POSITION {-1.2, 0.9, -1.2}
-#define SCENE_RIM_DIRECTION {0.74, -0.74, -0.3} /* not of length 1 */
+#define SCENE_KEY_POSITION                                                                                   \
+    {                                                                                                        \
+        0.6, 1.2, -0.4                                                                                       \
+    }
+#define SCENE_KEY_INTENSITY                                                                                  \
+    {                                                                                                        \
+        3, 2, 1                                                                                              \
+    }
+#define SCENE_RIM_POSITION                                                                                   \
+    {                                                                                                        \
+        -1.2, 0.9, -1.2                                                                                      \
+    }
+#define SCENE_RIM_DIRECTION                                                                                  \
+    {                                                                                                        \
+        0.74, -0.74, -0.3                                                                                    \
+    } /* not of length 1 */
 #define SCENE_RIM_ANGLE 60.0
 #define SCENE_RIM_BLEND 0.4
-#define SCENE_RIM_INTENSITY {0.5, 1.5, 2.5}
-#define SCENE_SUN_DIRECTION {-0.3, -0.9, -0.4}
-#define SCENE_SUN_IRRADIANCE {0.4, 0.3, 0.2}
+#define SCENE_RIM_INTENSITY                                                                                  \
+    {                                                                                                        \
+        0.5, 1.5, 2.5                                                                                        \
+    }
+#define SCENE_SUN_DIRECTION                                                                                  \
+    {                                                                                                        \
+        -0.3, -0.9, -0.4                                                                                     \
+    }
+#define SCENE_SUN_IRRADIANCE                                                                                 \
+    {                                                                                                        \
+        0.4, 0.3, 0.2                                                                                        \
+    }
 
 typedef struct scene {
     scene_camera camera;

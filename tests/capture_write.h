@@ -1,5 +1,5 @@
-/* Writes an analytic scene as a capture under given conventions: EXR files by OpenEXR's own core, and the manifest that
- * describes them. Include cmocka.h first: what cannot be written fails the test. */
+/* Writes an analytic scene as a capture under given conventions: EXR files by OpenEXR's own core, and the
+ * manifest that describes them. Include cmocka.h first: what cannot be written fails the test. */
 #ifndef RL_TESTS_CAPTURE_WRITE_H
 #define RL_TESTS_CAPTURE_WRITE_H
 
@@ -16,36 +16,37 @@ typedef enum capture_motion { MOTION_PIXELS, MOTION_UV, MOTION_NDC } capture_mot
 
 /* All zero: one float scanline file a frame, metres, planar, world normals, camera in the header. */
 typedef struct capture_form {
-    const char *name;         /* for people */
-    const char *title;        /* the manifest's `name`; NULL: cap */
+    const char *name;  /* for people */
+    const char *title; /* the manifest's `name`; NULL: cap */
     capture_files files;
-    rl_exr_pixel pixel;       /* RL_EXR_HALF, else float */
-    rl_exr_pixel stencil;     /* 0 is RL_EXR_UINT */
-    bool depth_uint;          /* depth as whole numbers of the unit */
+    rl_exr_pixel pixel;   /* RL_EXR_HALF, else float */
+    rl_exr_pixel stencil; /* 0 is RL_EXR_UINT */
+    bool depth_uint;      /* depth as whole numbers of the unit */
     rl_exr_compression compression;
     int tile;
     capture_depth depth;
     bool reversed;
-    double near, far;         /* metres */
-    const char *unit;         /* NULL: m */
-    double metres;            /* of that unit; 0: 1 */
-    double empty;             /* the file's value where nothing is; 0 means 0 */
-    const char *empty_key;    /* `empty:` in the manifest; NULL: not given */
+    double near, far;      /* metres */
+    const char *unit;      /* NULL: m */
+    double metres;         /* of that unit; 0: 1 */
+    double empty;          /* the file's value where nothing is; 0 means 0 */
+    const char *empty_key; /* `empty:` in the manifest; NULL: not given */
     bool normal_camera, forward_z;
     capture_normal normal;
     capture_camera camera;
     capture_fov fov;
     bool jitter_in_manifest;
-    const char *colorspace;   /* of albedo; NULL: lin_rec709 */
+    const char *colorspace;                                /* of albedo; NULL: lin_rec709 */
     void (*encode)(const double linear[3], double out[3]); /* into that; NULL: none */
-    double remap[2];          /* thickness in the unit, as 0..1; remap[1] 0: not remapped */
+    double remap[2]; /* thickness in the unit, as 0..1; remap[1] 0: not remapped */
     capture_motion motion;
     bool motion_next, motion_up;
-    const uint32_t *ids;      /* what the scene's ids 0..3 are in the file; NULL: themselves */
+    const uint32_t *ids; /* what the scene's ids 0..3 are in the file; NULL: themselves */
     const char *stencil_names, *frames, *extra; /* further lines of the manifest, or NULL */
-    const char *shadows;      /* NULL: {key: …, rim: …} by their names */
-    const char *lights;       /* NULL: the scene's */
-    bool no_lights, no_matrix; /* the header's matrix is left out */
+    const char *shadows;                        /* NULL: {key: …, rim: …} by their names */
+    const char *lights;                         /* NULL: the scene's */
+    bool blender;                               /* names of Cycles' passes; FILES_ONE */
+    bool no_lights, no_matrix;                  /* the header's matrix is left out */
     const uint32_t *time_code;
     int fps[2];
     const char *owner;

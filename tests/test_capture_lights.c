@@ -1,4 +1,5 @@
-/* Lights, colour spaces and presets over one capture: whoever says it, and in whichever unit, the picture is the same. */
+/* Lights, colour spaces and presets over one capture: whoever says it, and in whichever unit, the picture is
+ * the same. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -80,7 +81,7 @@ static void expect_lights(const char *lights, scene s)
     free(pipeline);
 }
 
-/* ---- units ---------------------------------------------------------------------------------------------------------- */
+/* ---- units ---- */
 
 static void test_photometric(void **state)
 {
@@ -88,22 +89,27 @@ static void test_photometric(void **state)
     /* 683 lm/W; lumen of a point: 4 pi candela; of a spot: its cone's solid angle, 2 pi (1 - cos 30°) */
     expect_lights("lights:\n"
                   "  key: {type: point, position: [0.6, 1.2, -0.4], candela: [2049, 1366, 683]}\n"
-                  "  rim: {type: spot, position: [-1.2, 0.9, -1.2], direction: [0.74, -0.74, -0.3], angle: 60, blend: 0.4,\n"
+                  "  rim: {type: spot, position: [-1.2, 0.9, -1.2], direction: [0.74, -0.74, -0.3], angle: "
+                  "60, blend: 0.4,\n"
                   "        lumen: [287.470334, 862.411001, 1437.351669]}\n"
                   "  sun: {type: directional, direction: [-0.3, -0.9, -0.4], lux: [273.2, 204.9, 136.6]}\n",
                   truth(SCENE_LIGHTS, SCENE_KEY | SCENE_RIM));
     expect_lights("lights:\n"
-                  "  key: {type: point, position: [0.6, 1.2, -0.4], lumen: 3769.911184, efficacy: 100, color: [1, 0.6666666667, 0.3333333333]}\n",
+                  "  key: {type: point, position: [0.6, 1.2, -0.4], lumen: 3769.911184, efficacy: 100, "
+                  "color: [1, 0.6666666667, 0.3333333333]}\n",
                   truth(SCENE_KEY, SCENE_KEY));
-    expect_lights("lights:\n"
-                  "  key: {type: point, position: [0.6, 1.2, -0.4], intensity: [0.75, 0.5, 0.25], exposure: 2}\n",
-                  truth(SCENE_KEY, SCENE_KEY));
+    expect_lights(
+        "lights:\n"
+        "  key: {type: point, position: [0.6, 1.2, -0.4], intensity: [0.75, 0.5, 0.25], exposure: 2}\n",
+        truth(SCENE_KEY, SCENE_KEY));
 }
 
-/* ---- shadows -------------------------------------------------------------------------------------------------------- */
+/* ---- shadows ---- */
 
 #define KEY "type: point, position: [0.6, 1.2, -0.4], intensity: [3, 2, 1]"
-#define RIM "type: spot, position: [-1.2, 0.9, -1.2], direction: [0.74, -0.74, -0.3], angle: 60, blend: 0.4, intensity: [0.5, 1.5, 2.5]"
+#define RIM                                                                                                  \
+    "type: spot, position: [-1.2, 0.9, -1.2], direction: [0.74, -0.74, -0.3], angle: 60, blend: 0.4, "       \
+    "intensity: [0.5, 1.5, 2.5]"
 
 /* The rim light behind the key's shadow, alone or with others. */
 static scene rim_in_key(unsigned others)
@@ -119,15 +125,18 @@ static scene rim_in_key(unsigned others)
 static void test_shadows(void **state)
 {
     (void)state;
-    expect_lights("lights: {rim: {" RIM "}, key: {" KEY "}}\n", truth(SCENE_KEY | SCENE_RIM, 3)); /* another order */
+    expect_lights("lights: {rim: {" RIM "}, key: {" KEY "}}\n",
+                  truth(SCENE_KEY | SCENE_RIM, 3)); /* another order */
     expect_lights("lights: {key: {" KEY ", enabled: false}, rim: {" RIM "}}\n", truth(SCENE_RIM, 3));
-    expect_lights("lights: {key: {" KEY ", shadow: none}, rim: {" RIM "}}\n", truth(SCENE_KEY | SCENE_RIM, SCENE_RIM));
+    expect_lights("lights: {key: {" KEY ", shadow: none}, rim: {" RIM "}}\n",
+                  truth(SCENE_KEY | SCENE_RIM, SCENE_RIM));
     expect_lights("lights: {lamp: {" KEY "}}\n", truth(SCENE_KEY, 0)); /* no layer of that name */
     expect_lights("lights: {lamp: {" KEY ", shadow: key}}\n", truth(SCENE_KEY, SCENE_KEY));
     capture_log_clear();
     expect_lights("lights: {rim: {" RIM ", shadow: key}}\n", rim_in_key(0));
     assert_non_null(strstr(capture_log(), "its shadow is stale")); /* it is the key's, 1.6 m away */
-    expect_lights("lights: {rim: {" RIM ", shadow: key}, key: {" KEY "}}\n", rim_in_key(SCENE_KEY)); /* a layer twice */
+    expect_lights("lights: {rim: {" RIM ", shadow: key}, key: {" KEY "}}\n",
+                  rim_in_key(SCENE_KEY)); /* a layer twice */
 }
 
 static void test_no_such_shadow(void **state)
@@ -139,17 +148,17 @@ static void test_no_such_shadow(void **state)
     rl_session *s = NULL;
     rl_error err = {0};
     assert_int_equal(rl_session_open(&options, &s, &err), RL_E_CONFIG);
-    assert_non_null(strstr(err.text, "light 'lamp': the capture 'cap' has no layer 'shadow.kay'; did you mean 'key'?"));
+    assert_non_null(
+        strstr(err.text, "light 'lamp': the capture 'cap' has no layer 'shadow.kay'; did you mean 'key'?"));
     free(pipeline);
 }
 
 static void test_renamed_layers(void **state)
 {
     (void)state;
-    static const capture_form renamed = {
-        .name = "renamed",
-        .shadows = "{two: shadow.rim, one: {channels: [shadow.key]}}",
-        .lights = "lights: {one: {" KEY "}, two: {" RIM "}}\n"};
+    static const capture_form renamed = {.name = "renamed",
+                                         .shadows = "{two: shadow.rim, one: {channels: [shadow.key]}}",
+                                         .lights = "lights: {one: {" KEY "}, two: {" RIM "}}\n"};
     scene s = truth(SCENE_KEY | SCENE_RIM, 3);
     char *own = folder_new();
     capture_write(own, &renamed, &s, 1);
@@ -158,7 +167,7 @@ static void test_renamed_layers(void **state)
     folder_remove(own);
 }
 
-/* ---- camera space ------------------------------------------------------------------------------------------------------ */
+/* ---- camera space ---- */
 
 static void test_camera_space(void **state)
 {
@@ -175,12 +184,13 @@ static void test_camera_space(void **state)
     snprintf(lights, sizeof lights,
              "lights:\n"
              "  key: {type: point, space: camera, position: [%.9g, %.9g, %.9g], intensity: [3, 2, 1]}\n"
-             "  sun: {type: directional, space: camera, direction: [%.9g, %.9g, %.9g], irradiance: [0.4, 0.3, 0.2]}\n",
+             "  sun: {type: directional, space: camera, direction: [%.9g, %.9g, %.9g], irradiance: [0.4, "
+             "0.3, 0.2]}\n",
              p[0], p[1], p[2], d[0], d[1], d[2]);
     expect_lights(lights, truth(SCENE_KEY | SCENE_SUN, SCENE_KEY));
 }
 
-/* ---- working space ------------------------------------------------------------------------------------------------------ */
+/* ---- working space ---- */
 
 /* Linear Rec.709 to AP1 by Bradford's adaptation (S-2014-004 and ITU-R BT.709, ten digits). */
 static const double to_ap1[9] = {0.6130974024, 0.3395231462, 0.0473794514, 0.0701937225, 0.9163538791,
@@ -216,11 +226,14 @@ static void test_working_space(void **state)
     expect(folder, pipeline, truth_in_ap1());
     free(pipeline);
     /* a light given in ACEScg, in a graph in linear Rec.709 */
-    expect_lights("lights:\n  key: {type: point, position: [0.6, 1.2, -0.4], shadow: none, colorspace: ACEScg,\n"
-                  "        intensity: [2.5657179502, 2.0567393227, 1.1508020121]}\n",
-                  truth(SCENE_KEY, 0));
-    /* neutral light: then the picture in AP1, taken back, is the picture in Rec.709; here in the output file */
-    char *neutral = with("color: {working: ACEScg}\nlights: {key: {type: point, position: [0.6, 1.2, -0.4], intensity: 2}}\n");
+    expect_lights(
+        "lights:\n  key: {type: point, position: [0.6, 1.2, -0.4], shadow: none, colorspace: ACEScg,\n"
+        "        intensity: [2.5657179502, 2.0567393227, 1.1508020121]}\n",
+        truth(SCENE_KEY, 0));
+    /* neutral light: then the picture in AP1, taken back, is the picture in Rec.709; here in the output file
+     */
+    char *neutral = with(
+        "color: {working: ACEScg}\nlights: {key: {type: point, position: [0.6, 1.2, -0.4], intensity: 2}}\n");
     char *output = text_replace(neutral, "type: float}", "type: float, colorspace: lin_rec709}");
     char *same = with("lights: {key: {type: point, position: [0.6, 1.2, -0.4], intensity: 2}}\n");
     float *red[2];
@@ -248,9 +261,9 @@ static void test_working_space(void **state)
     free(same);
 }
 
-/* ---- without a manifest, and with half of one ------------------------------------------------------------------------ */
+/* ---- without a manifest, and with half of one ---- */
 
-#define SUN "type: directional, direction: [-0.3, -0.9, -0.4], irradiance: [0.4, 0.3, 0.2]"
+#define SUN        "type: directional, direction: [-0.3, -0.9, -0.4], irradiance: [0.4, 0.3, 0.2]"
 #define ALL_LIGHTS "lights: {key: {" KEY "}, rim: {" RIM "}, sun: {" SUN "}}\n"
 
 static void test_bare(void **state)
@@ -274,30 +287,64 @@ static void test_bare(void **state)
     free(pipeline);
 }
 
+/* A session on a capture written in the pipeline; processes frame 2 and compares; frees the scene. */
+static void expect_inline(const char *lines, scene s)
+{
+    static const char *const images[] = {"c.color", "capture.motion"};
+    char *pipeline = with(lines);
+    rl_options options = {.pipeline_text = pipeline, .dump = images, .n_dump = 2};
+    rl_session *r = NULL;
+    rl_error err = {0};
+    if (rl_session_open(&options, &r, &err) || rl_session_process(r, 0, 2, NULL, &err))
+        fail_msg("%s:%d: %s", err.file, err.line, err.text);
+    rl_image_view color = capture_image(r, "c.color"), motion = capture_image(r, "capture.motion");
+    assert_true(capture_error(&color, &s, SCENE_COLOR, 3, 0) <= 4e-6);
+    assert_true(capture_error(&motion, &s, SCENE_MOTION, 2, 0) <= 1e-6);
+    rl_session_close(&r);
+    scene_free(&s);
+    free(pipeline);
+}
+
+#define DEGREES "45.8366236105"
+
 /* As DESIGN 3 has it: a preset, and what it leaves open. */
 static void test_preset_inline(void **state)
 {
     (void)state;
     rl_str lines = {0};
-    rl_str_printf(&lines, "capture: {files: \"%s/cap.####.exr\", preset: relit, name: cap, fps: 25, camera: {fov_x: %.12g}}\n",
-                  folder, 0.8 * 180 / 3.14159265358979323846);
+    rl_str_printf(
+        &lines,
+        "capture: {files: \"%s/cap.####.exr\", preset: relit, name: cap, fps: 25, camera: {fov_x: " DEGREES
+        "}}\n",
+        folder);
     rl_str_add(&lines, ALL_LIGHTS);
-    char *pipeline = with(lines.text);
-    rl_options options = {.pipeline_text = pipeline};
-    const char *color[] = {"c.color"};
-    options.dump = color;
-    options.n_dump = 1;
-    rl_session *r = NULL;
-    rl_error err = {0};
-    if (rl_session_open(&options, &r, &err) || rl_session_process(r, 0, 2, NULL, &err))
-        fail_msg("%s:%d: %s", err.file, err.line, err.text);
-    scene s = truth(SCENE_LIGHTS, 3);
-    rl_image_view view = capture_image(r, "c.color");
-    assert_true(capture_error(&view, &s, SCENE_COLOR, 3, 0) <= 4e-6);
-    rl_session_close(&r);
-    scene_free(&s);
+    expect_inline(lines.text, truth(SCENE_LIGHTS, 3));
     rl_str_free(&lines);
-    free(pipeline);
+}
+
+static void test_preset_blender(void **state)
+{
+    (void)state;
+    static const capture_form blender = {.name = "blender",
+                                         .blender = true,
+                                         .stencil = RL_EXR_FLOAT,
+                                         .empty = 1e10,
+                                         .motion_up = true,
+                                         .camera = CAMERA_MANIFEST};
+    scene s = truth(SCENE_LIGHTS, 0);
+    const double *v = s.camera.view;
+    rl_str lines = {0};
+    char *own = folder_new();
+    capture_write(own, &blender, &s, 2);
+    rl_str_printf(
+        &lines, "capture: {files: %s/cap.%%04d.exr, preset: blender, camera: {fov_x: " DEGREES ", matrix: [",
+        own);
+    for (int i = 0; i < 12; i++)
+        rl_str_printf(&lines, "%.12g, ", v[i]);
+    rl_str_add(&lines, "0, 0, 0, 1]}}\n" ALL_LIGHTS);
+    expect_inline(lines.text, s);
+    rl_str_free(&lines);
+    folder_remove(own);
 }
 
 static void test_memory_without_name(void **state)
@@ -317,15 +364,11 @@ static void test_memory_without_name(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_photometric),
-        cmocka_unit_test(test_shadows),
-        cmocka_unit_test(test_no_such_shadow),
-        cmocka_unit_test(test_renamed_layers),
-        cmocka_unit_test(test_camera_space),
-        cmocka_unit_test(test_working_space),
-        cmocka_unit_test(test_bare),
-        cmocka_unit_test(test_preset_inline),
-        cmocka_unit_test(test_memory_without_name),
+        cmocka_unit_test(test_photometric),    cmocka_unit_test(test_shadows),
+        cmocka_unit_test(test_no_such_shadow), cmocka_unit_test(test_renamed_layers),
+        cmocka_unit_test(test_camera_space),   cmocka_unit_test(test_working_space),
+        cmocka_unit_test(test_bare),           cmocka_unit_test(test_preset_inline),
+        cmocka_unit_test(test_preset_blender), cmocka_unit_test(test_memory_without_name),
     };
     return cmocka_run_group_tests(tests, setup, teardown);
 }

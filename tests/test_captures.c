@@ -1,4 +1,5 @@
-/* One analytic scene under many conventions: whatever a renderer wrote, the picture is the same (DESIGN 2). */
+/* One analytic scene under many conventions: whatever a renderer wrote, the picture is the same (DESIGN 2).
+ */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -27,7 +28,8 @@ static int teardown(void **state)
     return 0;
 }
 
-/* How far off a form may be: what its numbers lose, relative to the largest value of the image (normals: absolute). */
+/* How far off a form may be: what its numbers lose, relative to the largest value of the image (normals:
+ * absolute). */
 typedef struct allowed {
     double color, depth, normal;
 } allowed;
@@ -38,7 +40,8 @@ static void expect_ids(const rl_image_view *image, const scene *truth, const uin
 {
     for (size_t i = 0; i < truth->n; i++) {
         uint32_t id, want = ids ? ids[truth->id[i]] : truth->id[i];
-        memcpy(&id, image->plane[0] + i / (size_t)truth->width * image->stride + i % (size_t)truth->width, sizeof id);
+        memcpy(&id, image->plane[0] + i / (size_t)truth->width * image->stride + i % (size_t)truth->width,
+               sizeof id);
         if (id != want)
             fail_msg("pixel %zu has id %u instead of %u", i, id, want);
     }
@@ -59,14 +62,15 @@ static void expect_scene(const capture_form *f, const scene_camera *camera, allo
     rl_image_view color = capture_image(r, "c.color"), depth = capture_image(r, "capture.depth");
     rl_image_view normal = capture_image(r, "capture.normal"), id = capture_image(r, "capture.stencil");
     rl_image_view albedo = capture_image(r, "capture.albedo");
-    rl_image_view motion = capture_image(r, "capture.motion"), thickness = capture_image(r, "capture.thickness");
+    rl_image_view motion = capture_image(r, "capture.motion"),
+                  thickness = capture_image(r, "capture.thickness");
     double off_color = capture_error(&color, &s, SCENE_COLOR, 3, 0);
     double off_depth = capture_error(&depth, &s, SCENE_DEPTH, 1, 0);
     double off_normal = capture_error(&normal, &s, SCENE_NORMAL, 3, 1);
     double off_motion = capture_error(&motion, &s, SCENE_MOTION, 2, 0);
     double off_thickness = capture_error(&thickness, &s, SCENE_THICKNESS, 1, 0);
-    print_message("# %-28s color %.2g, depth %.2g, normal %.2g, motion %.2g, thickness %.2g\n", f->name, off_color,
-                  off_depth, off_normal, off_motion, off_thickness);
+    print_message("# %-28s color %.2g, depth %.2g, normal %.2g, motion %.2g, thickness %.2g\n", f->name,
+                  off_color, off_depth, off_normal, off_motion, off_thickness);
     assert_string_equal(capture_log(), "");
     expect_ids(&id, &s, f->ids);
     assert_true(off_color <= most.color);
@@ -86,7 +90,7 @@ static void expect_default(const capture_form *f, allowed most)
     expect_scene(f, &camera, most);
 }
 
-/* ---- channels, chunks, files ------------------------------------------------------------------------------------ */
+/* ---- channels, chunks, files ---- */
 
 static void test_storage(void **state)
 {
@@ -112,8 +116,8 @@ static void test_storage(void **state)
 static void test_windows(void **state)
 {
     static const int windows[][8] = {
-        {-9, -5, 61, 40, 0, 0, 72, 48},  /* beyond the upper left */
-        {7, 11, 53, 31, 0, 0, 72, 48},   /* inside */
+        {-9, -5, 61, 40, 0, 0, 72, 48},     /* beyond the upper left */
+        {7, 11, 53, 31, 0, 0, 72, 48},      /* inside */
         {100, 50, 72, 48, 100, 50, 72, 48}, /* both off the origin */
         {-40, -30, 90, 70, -20, -10, 72, 48},
     };
@@ -132,12 +136,12 @@ static void test_windows(void **state)
     }
 }
 
-/* ---- depth and units ---------------------------------------------------------------------------------------------- */
+/* ---- depth and units ---- */
 
 static void test_depth(void **state)
 {
     static const allowed device = {8e-6, 4e-6, 4e-7};   /* 1/z from 24 bits near 1 */
-    static const allowed reversed = {2e-6, 4e-7, 4e-7};  /* the float's exponent follows 1/z */
+    static const allowed reversed = {2e-6, 4e-7, 4e-7}; /* the float's exponent follows 1/z */
     static const allowed millimetre = {2e-3, 2e-4, 4e-7};
     const struct {
         capture_form form;
@@ -151,11 +155,23 @@ static void test_depth(void **state)
         {{.name = "radial, empty inf", .depth = DEPTH_RADIAL, .empty = INFINITY}, full},
         {{.name = "radial, empty 1e10", .depth = DEPTH_RADIAL, .empty = 1e10, .empty_key = "1e10"}, full},
         {{.name = "device", .depth = DEPTH_DEVICE, .near = 0.1, .far = 50, .empty = 1}, device},
-        {{.name = "device, far at infinity", .depth = DEPTH_DEVICE, .near = 0.1, .far = INFINITY, .empty = 1}, device},
-        {{.name = "device, reversed", .depth = DEPTH_DEVICE, .near = 0.1, .far = 50, .reversed = true}, reversed},
-        {{.name = "device, reversed, infinite", .depth = DEPTH_DEVICE, .near = 0.1, .far = INFINITY, .reversed = true},
+        {{.name = "device, far at infinity", .depth = DEPTH_DEVICE, .near = 0.1, .far = INFINITY, .empty = 1},
+         device},
+        {{.name = "device, reversed", .depth = DEPTH_DEVICE, .near = 0.1, .far = 50, .reversed = true},
          reversed},
-        {{.name = "device in cm", .depth = DEPTH_DEVICE, .near = 0.1, .far = 50, .reversed = true, .unit = "cm", .metres = 0.01},
+        {{.name = "device, reversed, infinite",
+          .depth = DEPTH_DEVICE,
+          .near = 0.1,
+          .far = INFINITY,
+          .reversed = true},
+         reversed},
+        {{.name = "device in cm",
+          .depth = DEPTH_DEVICE,
+          .near = 0.1,
+          .far = 50,
+          .reversed = true,
+          .unit = "cm",
+          .metres = 0.01},
          reversed},
         {{.name = "uint millimetres", .depth_uint = true, .unit = "mm", .metres = 0.001}, millimetre},
     };
@@ -169,7 +185,12 @@ static void test_units(void **state)
     static const capture_form forms[] = {
         {.name = "centimetres", .unit = "cm", .metres = 0.01},
         {.name = "millimetres", .unit = "mm", .metres = 0.001, .depth = DEPTH_RADIAL},
-        {.name = "feet", .unit = "0.3048", .metres = 0.3048, .camera = CAMERA_MANIFEST, .empty = 1e10, .empty_key = "1e10"},
+        {.name = "feet",
+         .unit = "0.3048",
+         .metres = 0.3048,
+         .camera = CAMERA_MANIFEST,
+         .empty = 1e10,
+         .empty_key = "1e10"},
         {.name = "centimetres, forward +z", .unit = "cm", .metres = 0.01, .forward_z = true},
         {.name = "thickness as a texture", .remap = {0.005, 0.05}},
         {.name = "the same in millimetres", .unit = "mm", .metres = 0.001, .remap = {5, 50}},
@@ -179,7 +200,7 @@ static void test_units(void **state)
         expect_default(&forms[i], full);
 }
 
-/* ---- normals and cameras ------------------------------------------------------------------------------------------ */
+/* ---- normals and cameras ---- */
 
 static void test_normals(void **state)
 {
@@ -205,7 +226,10 @@ static void test_cameras(void **state)
         {.name = "screen window", .fov = FOV_WINDOW},
         {.name = "matrix in the manifest", .camera = CAMERA_MANIFEST},
         {.name = "fov in the manifest", .fov = FOV_MANIFEST},
-        {.name = "all in the manifest", .camera = CAMERA_MANIFEST, .fov = FOV_MANIFEST, .jitter_in_manifest = true},
+        {.name = "all in the manifest",
+         .camera = CAMERA_MANIFEST,
+         .fov = FOV_MANIFEST,
+         .jitter_in_manifest = true},
         {.name = "lists of one", .camera = CAMERA_LIST, .fov = FOV_LIST, .forward_z = true},
     };
     (void)state;
@@ -232,7 +256,7 @@ static void test_cameras(void **state)
     }
 }
 
-/* ---- motion, ids, colours ------------------------------------------------------------------------------------------ */
+/* ---- motion, ids, colours ---- */
 
 static void test_motion(void **state)
 {
@@ -253,7 +277,8 @@ static void test_motion(void **state)
 
 static void test_ids(void **state)
 {
-    static const uint32_t big[4] = {0, 4294967295u, 2147483648u, 4026531841u}, negative[4] = {0, (uint32_t)-1, (uint32_t)-300, 70000},
+    static const uint32_t big[4] = {0, 4294967295u, 2147483648u, 4026531841u},
+                          negative[4] = {0, (uint32_t)-1, (uint32_t)-300, 70000},
                           small[4] = {7, 7, 2048, 0}; /* an id of empty pixels, shared; id 0 as a material */
     const capture_form forms[] = {
         {.name = "32-bit ids", .ids = big},
@@ -272,7 +297,8 @@ static void encode_srgb(const double in[3], double out[3])
         out[i] = in[i] <= 0.0031308 ? 12.92 * in[i] : 1.055 * pow(in[i], 1 / 2.4) - 0.055;
 }
 
-/* Linear Rec.709 to AP1, Bradford from D65 to the white of ACES (S-2014-004 and the CIE's Rec.709, to 10 digits). */
+/* Linear Rec.709 to AP1, Bradford from D65 to the white of ACES (S-2014-004 and the CIE's Rec.709, to 10
+ * digits). */
 static const double to_ap1[9] = {0.6130974024, 0.3395231462, 0.0473794514, 0.0701937225, 0.9163538791,
                                  0.0134523985, 0.0206155929, 0.1095697729, 0.8698146342};
 
@@ -288,7 +314,11 @@ static void test_albedo_spaces(void **state)
     static const capture_form forms[] = {
         {.name = "albedo in ACEScg", .colorspace = "ACEScg", .encode = encode_acescg},
         {.name = "albedo as sRGB texture", .colorspace = "srgb_texture", .encode = encode_srgb},
-        {.name = "by an alias, tiled parts", .colorspace = "sRGB", .encode = encode_srgb, .files = FILES_PARTS, .tile = 16},
+        {.name = "by an alias, tiled parts",
+         .colorspace = "sRGB",
+         .encode = encode_srgb,
+         .files = FILES_PARTS,
+         .tile = 16},
     };
     (void)state;
     for (size_t i = 0; i < sizeof forms / sizeof *forms; i++)

@@ -58,10 +58,9 @@ rl_code rl_session_map_image(const rl_sequence *q, const rl_frame *f, int buffer
     out->planes = b->planes;
     out->format = b->image >= 0 ? q->graph->images[b->image].format : RL_SCALAR;
     out->stride = (size_t)g->stride;
-    const float *base =
+    out->plane = (size_t)g->plane;
+    out->pixels =
         (const float *)p + RL_GUARD + (size_t)(g->y - g->origin_y) * (size_t)g->stride + (size_t)(g->x - g->origin_x);
-    for (int i = 0; i < b->planes && i < 16; i++)
-        out->plane[i] = base + (size_t)i * (size_t)g->plane;
     return RL_OK;
 }
 
@@ -75,7 +74,7 @@ static void restore_ids(const rl_frame *f, const char *name, rl_sink_image *imag
 {
     if (strcmp(name, "capture.stencil") || !f->ids)
         return;
-    image->plane[0] = (const float *)(const void *)f->ids;
+    image->pixels = (const float *)(const void *)f->ids;
     image->stride = (size_t)f->geometry.width;
 }
 
@@ -115,7 +114,7 @@ static rl_code write_frame(rl_session *s, rl_sequence *q, rl_frame *f, rl_arena 
     rl_sink_frame frame = {.data_window = f->data_window,
                            .display_window = f->display_window,
                            .crop = s->options.crop[2] > 0 ? s->options.crop : NULL,
-                           .stencil = (const uint32_t *)(const void *)stencil.plane[0],
+                           .stencil = (const uint32_t *)(const void *)stencil.pixels,
                            .stencil_stride = stencil.stride,
                            .source = f->files[f->main_file],
                            .source_part = f->main_part,
@@ -401,8 +400,10 @@ rl_code rl_session_image(rl_session *s, const char *image, rl_image_view *out, r
                            .height = s->frame.geometry.height,
                            .planes = view.planes,
                            .format = rl_format_name(view.format),
-                           .stride = view.stride};
-    memcpy(out->plane, view.plane, sizeof out->plane);
+                           .stride = view.stride,
+                           .plane_stride = view.plane};
+    for (int i = 0; i < view.planes && i < (int)(sizeof out->plane / sizeof *out->plane); i++)
+        out->plane[i] = view.pixels + (size_t)i * view.plane;
     /* The view stays valid on host-memory devices; others keep the mapping until the next map of the same buffer. */
     return rl_memory_unmap(memory, err);
 }
