@@ -131,8 +131,8 @@ $(BUILD)/tests/%: $(BUILD)/tests/%.o $(BUILD)/tests/sanitizers.o $(BUILD)/tests/
 	$(call say,link $@)
 	$(Q)$(CC) $(LDFLAGS) -o $@ $^ $(LIBS) -lcmocka
 
-# It loads the module; so does whatever writes PNG files.
-$(BUILD)/tests/test_image_file: | $(BUILD)/relit_oiio.so
+# They load the module; so does whatever writes PNG files.
+$(BUILD)/tests/test_image_file $(BUILD)/tests/test_sg_run: | $(BUILD)/relit_oiio.so
 
 test-build: all $(TESTS) $(BENCHES)
 
