@@ -5,6 +5,7 @@
 #   make             build build/relit, build/librelit.a, build/librelit.so and the modules
 #   make test-asan   the tests under AddressSanitizer and UndefinedBehaviorSanitizer
 #   make bench       kernels and codecs against their peers
+#   make accuracy    TRUTH=folder: every model against a path-traced truth (tests/accuracy.c)
 #   make install     PREFIX=/usr/local: program, library, headers, relit.pc, configs, kernels
 #   make deps        Debian packages
 #   make format      clang-format; make layers: includes point one way only
@@ -47,7 +48,7 @@ LIB_O   := $(LIB_C:%.c=$(BUILD)/%.o) $(LIB_CXX:%.cc=$(BUILD)/%.o) $(BUILD)/kerne
 TOOL_O  := $(TOOL_C:%.c=$(BUILD)/%.o)
 MAIN_O  := $(BUILD)/graph/tool/relit.o
 TESTS   := $(patsubst tests/%.c,$(BUILD)/tests/%,$(wildcard tests/test_*.c))
-HELP_O  := $(patsubst tests/%.c,$(BUILD)/tests/%.o,$(filter-out tests/test_%.c tests/bench_%.c tests/example.c,$(wildcard tests/*.c)))
+HELP_O  := $(patsubst tests/%.c,$(BUILD)/tests/%.o,$(filter-out tests/test_%.c tests/bench_%.c tests/example.c tests/accuracy.c,$(wildcard tests/*.c)))
 
 all: $(BUILD)/relit $(BUILD)/librelit.a $(BUILD)/librelit.so $(BUILD)/relit_oiio.so
 
@@ -151,6 +152,12 @@ deps:
 	  $$sudo apt-get update -qq && DEBIAN_FRONTEND=noninteractive $$sudo apt-get install -y -qq --no-install-recommends $$missing; \
 	fi
 
+# Pictures of the error go to OUT.
+OUT ?= out/accuracy
+accuracy: all $(BUILD)/tests/accuracy
+	@test -n "$(TRUTH)" || { echo "give TRUTH=folder, as tests/accuracy_scene.h describes it" >&2; exit 2; }
+	@$(BUILD)/tests/accuracy $(TRUTH) $(OUT)
+
 install: all
 	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/lib/pkgconfig $(DESTDIR)$(PREFIX)/lib/relit \
 	  $(DESTDIR)$(PREFIX)/include/relit/graph/base $(DESTDIR)$(PREFIX)/share/relit/kernels
@@ -175,4 +182,4 @@ layers:
 clean:
 	rm -rf $(BUILD) build-asan
 
-.PHONY: all demo test test-build test-asan deps install format layers clean
+.PHONY: all accuracy demo test test-build test-asan deps install format layers clean
