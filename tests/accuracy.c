@@ -4,7 +4,7 @@
  *     make accuracy TRUTH=folder [OUT=folder]
  *
  * Error is mean |result - truth| / mean truth, bias mean (result - truth) / mean truth, per channel, over the
- * pixels of a material that are not within 2 of a silhouette, a material's border or a hard shadow's edge.
+ * pixels of a material at least 2 from a silhouette, a material's border or a hard shadow's edge.
  * Models are found in the registry: every pass from diffuse and lit to color, with every word of the
  * parameters that change its code. Pictures: OUT/MODEL.png, blue too dark, red too bright, full colour 10 %.
  */

@@ -204,6 +204,17 @@ bool accuracy_render(accuracy_scene *s, const accuracy_model *model, accuracy_li
 
 /* ---- masks ---- */
 
+/* Whether the depth jumps between a pixel and its right or lower neighbour: by more than five pixels are
+ * wide, which is a fold of the surface before itself. */
+static bool jumps(const accuracy_scene *s, const float *depth, int x, int y)
+{
+    size_t at = (size_t)y * (size_t)s->width + (size_t)x;
+    float most = 5 * depth[at] / (float)s->focal;
+    return (x + 1 < s->width && fabsf(depth[at] - depth[at + 1]) > most) ||
+           (y + 1 < s->height && fabsf(depth[at] - depth[at + (size_t)s->width]) > most);
+}
+
+/* `shadows`: n planes. */
 static bool near_edge(const accuracy_scene *s, const float *depth, const float *shadows, size_t n, int x,
                       int y)
 {
@@ -211,17 +222,16 @@ static bool near_edge(const accuracy_scene *s, const float *depth, const float *
     for (int dy = -ACCURACY_APART; dy <= ACCURACY_APART; dy++)
         for (int dx = -ACCURACY_APART; dx <= ACCURACY_APART; dx++) {
             int nx = x + dx, ny = y + dy;
+            if (dx * dx + dy * dy > ACCURACY_APART * ACCURACY_APART)
+                continue;
             if (nx < 0 || ny < 0 || nx >= s->width || ny >= s->height)
                 return true;
             size_t to = (size_t)ny * (size_t)s->width + (size_t)nx;
-            if (s->id[to] != s->id[at])
+            if (s->id[to] != s->id[at] || jumps(s, depth, nx, ny))
                 return true;
             for (size_t k = 0; k < n; k++)
                 if (shadows[k * s->n + to] != shadows[k * s->n + at])
                     return true;
-            /* A fold of the same material before itself: a step that is more than ten pixels are wide. */
-            if (fabsf(depth[to] - depth[at]) > 10 * depth[at] / (float)s->focal)
-                return true;
         }
     return false;
 }

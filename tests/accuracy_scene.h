@@ -19,8 +19,10 @@
 
 enum { ACCURACY_MATERIALS = 8, ACCURACY_LIGHTS = 8, ACCURACY_FRAMES = 16 };
 
-/* Pixels this near to an edge (box-filtered in the truth, points in the G-buffer) are not compared. */
-enum { ACCURACY_APART = 2 };
+/* Pixels are compared when everything across a silhouette, a material's border or a hard shadow's edge is
+ * farther away than this, centre to centre: the edge itself, which the truth filters over a pixel where the
+ * G-buffer has points, is 2 pixels away at least. */
+enum { ACCURACY_APART = 3 };
 
 typedef struct accuracy_material {
     const char *name;
@@ -47,7 +49,7 @@ typedef struct accuracy_scene {
     size_t n_lights;
     double to_world[3][4], focal;                /* camera: rows; pixels */
     rl_image_file truth, rim_truth, rim_lambert; /* planes R, G, B; the last two may be empty */
-    uint8_t *clear; /* pixels that are not within 2 of a silhouette, a material's border and a hard shadow's
+    uint8_t *clear; /* pixels at least 2 from a silhouette, a material's border and a hard shadow's
                        edge */
     uint8_t *ear;   /* pixels that the rim light reaches from behind only */
     int *id;        /* of the material */
