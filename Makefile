@@ -51,6 +51,7 @@ TESTS   := $(patsubst tests/%.c,$(BUILD)/tests/%,$(wildcard tests/test_*.c))
 SCRIPTS := $(wildcard tests/test_*.sh)
 # Programs of their own; all other files in tests/ are helpers that they share.
 MAINS   := tests/test_%.c tests/bench_%.c tests/fit_%.c tests/make_%.c tests/example.c tests/accuracy.c tests/temporal.c tests/fuzz/main.c
+BENCHES := $(patsubst tests/%.c,$(BUILD)/tests/%,$(wildcard tests/bench_*.c))
 HELP_O  := $(patsubst tests/%.c,$(BUILD)/tests/%.o,$(filter-out $(MAINS),$(wildcard tests/*.c tests/fuzz/*.c)))
 
 all: $(BUILD)/relit $(BUILD)/librelit.a $(BUILD)/librelit.so $(BUILD)/relit_oiio.so
@@ -130,23 +131,24 @@ $(BUILD)/tests/%: $(BUILD)/tests/%.o $(BUILD)/tests/sanitizers.o $(BUILD)/tests/
 	$(call say,link $@)
 	$(Q)$(CC) $(LDFLAGS) -o $@ $^ $(LIBS) -lcmocka
 
-# It loads the module; so does whatever writes PNG files.
-$(BUILD)/tests/test_image_file: | $(BUILD)/relit_oiio.so
+# They load the module; so does whatever writes PNG files.
+$(BUILD)/tests/test_image_file $(BUILD)/tests/test_sg_run: | $(BUILD)/relit_oiio.so
 
-test-build: all $(TESTS)
+test-build: all $(TESTS) $(BENCHES)
 
 test: deps
 	@$(MAKE) --no-print-directory -j2 test-build layers
 	@BUILD=$(BUILD) tests/run.sh $(TESTS) $(SCRIPTS)
 
-ASAN = BUILD=build-asan SAN="-fsanitize=address,undefined -fno-sanitize-recover=undefined"
+SANITIZE = -fsanitize=address,undefined -fno-sanitize-recover=undefined
+ASAN     = BUILD=build-asan SAN="$(SANITIZE)"
 
 test-asan: deps
 	@$(MAKE) --no-print-directory -j2 $(ASAN) test-build
-	@BUILD=build-asan ASAN_OPTIONS=detect_leaks=0 tests/run.sh $(patsubst $(BUILD)/%,build-asan/%,$(TESTS))
+	@$(ASAN) ASAN_OPTIONS=detect_leaks=0 tests/run.sh $(patsubst $(BUILD)/%,build-asan/%,$(TESTS))
 
 # Kernels and codecs against their peers; tests/bench_batch.sh says what can be chosen.
-bench: all $(BUILD)/tests/bench_sss $(BUILD)/tests/bench_capture
+bench: all $(BENCHES)
 	$(BUILD)/tests/bench_sss
 	@BUILD=$(BUILD) tests/bench_batch.sh
 

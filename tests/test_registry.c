@@ -355,7 +355,7 @@ static rl_memory *image_memory(void)
     return m;
 }
 
-/* As the executor orders them (graph/model/pass.h): ports, params, frame, materials, lights, tables. */
+/* As the executor orders them (graph/model/pass.h): ports, params, frame, materials, lights, ambient, tables. */
 static size_t make_arguments(const form *f, rl_memory **args)
 {
     const rl_pass *p = f->pass;
@@ -369,7 +369,7 @@ static size_t make_arguments(const form *f, rl_memory **args)
     frame.previous = frame.camera;
     for (size_t i = 0; i < p->ports.n; i++)
         args[n++] = f->buffers[i] < 0 ? NULL : image_memory();
-    size_t extra = (p->params.n > 0) + 2u + p->lights + (p->tables != NULL);
+    size_t extra = (p->params.n > 0) + 2u + p->lights + p->ambient + (p->tables != NULL);
     for (size_t i = 0; i < extra; i++)
         assert_int_equal(rl_memory_new(device, 1 << 18, 0, &args[n + i], &err), RL_OK);
     if (p->params.n > 0)

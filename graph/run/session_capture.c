@@ -192,6 +192,8 @@ static rl_code make_plan(rl_session *s, rl_sequence *q, rl_error *err)
                               s->n_outputs + 1, &q->graph, err);
     if (!code)
         code = check_formats(s, q->graph, err);
+    if (!code)
+        code = rl_graph_check_needs(&s->arena, q->graph, q->materials, err);
     return code ? code : rl_plan_make(&s->arena, q->graph, &q->plan, err);
 }
 
