@@ -105,6 +105,9 @@ $(BUILD)/kernels.o: $(BUILD)/kernels.c
 # Loops over every sample of a frame: gcc vectorizes them from -O3 on.
 $(BUILD)/graph/run/ingest.o: OPT += -O3
 
+# Sums over filter taps, the same.
+$(BUILD)/graph/tool/metric_filter.o: OPT += -O3
+
 # Where `make install` puts things that are looked for at run time; a build tree finds its own first.
 $(BUILD)/graph/run/image_module.o: CPPFLAGS += -DRL_MODULE_DIR='"$(PREFIX)/lib/relit"'
 $(BUILD)/graph/run/data_files.o: CPPFLAGS += -DRELIT_DATADIR='"$(PREFIX)/share/relit/configs"'
