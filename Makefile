@@ -6,6 +6,7 @@
 #   make test-asan   the tests under AddressSanitizer and UndefinedBehaviorSanitizer
 #   make fuzz        changed inputs against parsers and readers, FUZZ_SECONDS=60 each
 #   make bench       kernels and codecs against their peers
+#   make accuracy    TRUTH=folder: every model against a path-traced truth (tests/accuracy.c)
 #   make install     PREFIX=/usr/local: program, library, headers, relit.pc, configs, kernels
 #   make deps        Debian packages
 #   make format      clang-format 14 (make format-check only looks); make layers: includes point one way only
@@ -178,6 +179,12 @@ deps:
 	  $$sudo apt-get update -qq && DEBIAN_FRONTEND=noninteractive $$sudo apt-get install -y -qq --no-install-recommends $$missing; \
 	fi
 
+# Pictures of the error go to OUT.
+OUT ?= out/accuracy
+accuracy: all $(BUILD)/tests/accuracy
+	@test -n "$(TRUTH)" || { echo "give TRUTH=folder, as tests/accuracy_scene.h describes it" >&2; exit 2; }
+	@$(BUILD)/tests/accuracy $(TRUTH) $(OUT)
+
 install: all
 	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/lib/pkgconfig $(DESTDIR)$(PREFIX)/lib/relit \
 	  $(DESTDIR)$(PREFIX)/include/relit/graph/base $(DESTDIR)$(PREFIX)/share/relit/kernels
@@ -204,4 +211,4 @@ layers:
 clean:
 	rm -rf $(BUILD) build-asan
 
-.PHONY: all demo bench test test-build test-asan deps install format format-check layers clean fuzz
+.PHONY: all demo bench test test-build test-asan deps install format format-check layers clean fuzz accuracy
