@@ -10,7 +10,7 @@
 #include "graph/model/graph.h"
 
 static const rl_step one_step[] = {
-    {"run", RL_EVERY_PIXEL}
+    {"run", .domain = RL_EVERY_PIXEL}
 };
 #define FAKE(name_, ports_)                                                                                  \
     {                                                                                                        \

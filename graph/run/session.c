@@ -77,6 +77,8 @@ rl_code rl_session_open(const rl_options *options, rl_session **out, rl_error *e
     if (!code)
         code = rl_session_colors(s, err);
     if (!code)
+        code = rl_session_ambient(s, err);
+    if (!code)
         code = rl_session_sequences(s, err);
     if (!code)
         code = rl_session_paths(s, err);

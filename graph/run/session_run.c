@@ -29,7 +29,6 @@ static rl_code fit_buffers(rl_sequence *q, rl_frame *f, rl_error *err)
 
 rl_code rl_session_execute(rl_session *s, rl_sequence *q, rl_frame *f, bool cut, rl_error *err)
 {
-    (void)s;
     rl_code code = rl_executor_resize(q->executor, &f->geometry, err);
     if (code)
         return code;
@@ -37,7 +36,8 @@ rl_code rl_session_execute(rl_session *s, rl_sequence *q, rl_frame *f, bool cut,
         rl_executor_cut(q->executor);
     rl_session_light_values(q, &f->camera, q->light_values);
     rl_frame_values values = {
-        .number = f->number, .camera = f->camera, .lights = q->light_values, .n_lights = (int)q->n_lights};
+        .number = f->number, .camera = f->camera, .lights = q->light_values, .n_lights = (int)q->n_lights,
+        .ambient = &s->ambient};
     return rl_executor_run(q->executor, f->buffers, &values, NULL, err);
 }
 
