@@ -13,6 +13,7 @@
 #ifndef RL_RELIT_H
 #define RL_RELIT_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -59,6 +60,11 @@ typedef struct rl_options {
     const char *device;    /* "cpu", "gpu", a number; NULL = a CPU device if there is one */
     uint64_t memory_limit; /* bytes; 0 = none */
     rl_on_missing on_missing;
+    bool resume;           /* frames whose pictures are there, made of the same inputs by the same pipeline, stay */
+    int shard[2];          /* {I, N}: the I-th of N parts, from 1; N = 0: everything */
+    int preroll;           /* frames of warm-up before a shard's first; 0 = history comes from the shard before it */
+    int checkpoint_frames; /* a checkpoint of history every so many frames; 0 = by what one costs */
+    const char *trace;     /* a file for what ran when, as Chrome trace events; NULL = none */
     const char *ocio; /* OpenColorIO config; NULL = the pipeline's, else $OCIO, else relit's own */
     const rl_log *log;
 } rl_options;
@@ -111,6 +117,8 @@ typedef struct rl_run_hooks {
 
 typedef struct rl_run_summary {
     size_t frames, failed;
+    size_t skipped; /* frames that a resumed run found done */
+    bool lacking;   /* the shard before this one has not handed over its history yet: nothing was written */
     uint64_t nonfinite, clamped, clipped;
     size_t peak_bytes; /* the most that relit had allocated, device buffers included */
 } rl_run_summary;

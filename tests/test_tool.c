@@ -146,7 +146,11 @@ static void test_usage(void **state)
         {{"init", "c", "--frames", "1"}, "it is for run, check, plan"},
         {{"run", "p", "--quiet", "--verbose"}, "exclude each other"},
         {{"passes", "lightning"}, "did you mean 'lighting'?"},
-        {{"run", "p", "--resume"}, "there is no option '--resume'"},
+        {{"run", "p", "--shard", "0/3"}, "I from 1 to N"},
+        {{"run", "p", "--shard", "4/3"}, "I from 1 to N"},
+        {{"run", "p", "--shard", "3"}, "I from 1 to N"},
+        {{"run", "p", "--preroll", "4"}, "give --shard I/N too"},
+        {{"check", "p", "--resume"}, "it is for run"},
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         tool_result r = tool_run(rows[i].arguments);

@@ -6,9 +6,9 @@
 #include "graph/base/file.h"
 #include "graph/run/batch.h"
 #include "graph/run/camera.h"
-#include "graph/run/session.h"
+#include "graph/run/session_state.h"
 
-enum { MOST_IN_FLIGHT = 3, MOST_OUTPUT_FILES = 64 };
+enum { MOST_OUTPUT_FILES = 64 };
 
 static double now_s(void)
 {
@@ -138,11 +138,12 @@ static rl_code write_frame(rl_session *s, rl_sequence *q, rl_frame *f, rl_arena 
 typedef struct batch_state {
     rl_session *s;
     rl_sequence *q;
-    rl_frame frames[MOST_IN_FLIGHT];
-    bool skipped[MOST_IN_FLIGHT];
+    rl_frame frames[RL_MOST_IN_FLIGHT];
+    bool skipped[RL_MOST_IN_FLIGHT];
     const rl_run_hooks *hooks;
     rl_run_summary *summary;
-    size_t done_before, total;
+    size_t done, total; /* frames of all captures that this run writes */
+    rl_sequence_state state;
     bool history; /* the frame before this one ran, without a gap */
     int previous;
     camera_t camera;
@@ -154,11 +155,12 @@ static void batch_load(void *ctx, size_t item, int slot)
     rl_frame *f = &b->frames[slot];
     rl_geometry before = f->geometry;
     double start = now_s();
-    f->number = b->q->frames.numbers[item];
+    f->number = b->q->frames.numbers[b->state.work[item].frame];
     f->error = (rl_error){0};
     f->run_s = f->write_s = 0;
     f->clipped = 0;
     b->skipped[slot] = false;
+    b->state.slots[slot].inputs = (rl_inputs){.missing = true};
     if (!rl_reader_open(b->q->reader, f->number, f, &f->error) && !fit_buffers(b->q, f, &before, &f->error))
         rl_reader_pixels(b->q->reader, f, b->s->pool, &f->error);
     if (f->error.code == RL_E_IO && b->s->options.on_missing == RL_MISSING_SKIP) {
@@ -166,6 +168,8 @@ static void batch_load(void *ctx, size_t item, int slot)
                   f->error.text);
         b->skipped[slot] = true;
     }
+    if (!f->error.code)
+        rl_state_loaded(&b->state, slot, f);
     f->load_s = now_s() - start;
 }
 
@@ -181,13 +185,18 @@ static bool is_cut(const batch_state *b, const rl_frame *f)
 
 static void batch_run(void *ctx, size_t item, int slot)
 {
-    (void)item;
     batch_state *b = ctx;
     rl_frame *f = &b->frames[slot];
+    const rl_work *work = &b->state.work[item];
     double start = now_s();
+    bool restored = false;
+    if (!f->error.code)
+        rl_state_ready(&b->state, work, slot, f->number, &restored, &b->previous, &b->camera, &f->error);
+    b->history = restored || (b->history && work->start == RL_START_ON);
     bool cut = f->error.code || is_cut(b, f);
     if (!f->error.code)
         rl_session_execute(b->s, b->q, f, cut, &f->error);
+    rl_state_ran(&b->state, work, slot, f, !f->error.code);
     b->history = !f->error.code;
     b->previous = f->number;
     b->camera = f->camera;
@@ -202,13 +211,17 @@ static void batch_write(void *ctx, size_t item, int slot)
     const char *files[MOST_OUTPUT_FILES];
     size_t n_files = 0;
     double start = now_s();
-    if (!f->error.code)
+    const rl_work *work = &b->state.work[item];
+    if (!f->error.code && work->write && !rl_state_writing(&b->state, slot, f->number, &f->error))
         write_frame(b->s, b->q, f, &arena, files, &n_files, &f->error);
+    rl_state_written(&b->state, work, slot, f);
     f->write_s = now_s() - start;
     rl_frame_release(f);
     if (b->skipped[slot])
         f->error = (rl_error){0};
-    b->summary->frames++;
+    bool shown = work->write || f->error.code; /* warm-up is nobody's business unless it fails */
+    b->done += work->write;
+    b->summary->frames += shown;
     b->summary->failed += f->error.code != RL_OK;
     b->summary->nonfinite += f->nonfinite;
     b->summary->clamped += f->clamped;
@@ -224,9 +237,9 @@ static void batch_write(void *ctx, size_t item, int slot)
                               .load_s = f->load_s,
                               .run_s = f->run_s,
                               .write_s = f->write_s,
-                              .done = b->done_before + item + 1,
+                              .done = b->done,
                               .total = b->total};
-    if (b->hooks && b->hooks->frame)
+    if (shown && b->hooks && b->hooks->frame)
         b->hooks->frame(b->hooks->ctx, &result);
     rl_arena_free(&arena);
 }
@@ -240,36 +253,78 @@ static int batch_stop(void *ctx)
 /* As many frames as overlap usefully and as the memory limit lets be in flight. */
 static int in_flight(const rl_session *s, const rl_sequence *q)
 {
-    int n = MOST_IN_FLIGHT;
+    int n = RL_MOST_IN_FLIGHT;
     while (n > 1 && s->options.memory_limit && rl_plan_bytes(q->plan, &q->geometry, n) > s->options.memory_limit)
         n--;
     return n;
 }
 
-static rl_code run_sequence(rl_session *s, rl_sequence *q, const rl_run_hooks *hooks, size_t done, size_t total,
-                            rl_run_summary *summary, bool *stopped, rl_error *err)
+/* What a sequence's state says before its frames run. */
+static void announce(const rl_session *s, const rl_sequence_state *st)
 {
-    batch_state *b = rl_calloc(1, sizeof *b);
-    if (!b)
-        return rl_fail_memory(err, sizeof *b);
-    b->s = s;
-    b->q = q;
-    b->hooks = hooks;
-    b->summary = summary;
-    b->done_before = done;
-    b->total = total;
-    rl_batch batch = {.items = q->frames.n,
-                      .in_flight = in_flight(s, q),
+    const char *name = st->sequence->manifest->name;
+    if (s->options.resume && st->n_there)
+        rl_report(s->log, RL_NOTE, RL_NOWHERE, "'%s': %zu frames are there already", name, st->n_there);
+    if (st->n_work && st->work[0].start == RL_START_CHECKPOINT)
+        rl_report(s->log, RL_NOTE, RL_NOWHERE, "'%s': going on from the checkpoint after frame %d", name,
+                  st->sequence->frames.numbers[st->work[0].frame - 1]);
+    if (st->n_work > st->n_write)
+        rl_report(s->log, RL_NOTE, RL_NOWHERE, "'%s': %zu frames are processed for their history only", name,
+                  st->n_work - st->n_write);
+}
+
+static rl_code lacking(const rl_session *s, const rl_sequence_state *st, rl_error *err)
+{
+    const int *shard = s->options.shard;
+    return rl_fail_file(err, RL_E_IO, st->folder,
+                        "'%s': shard %d/%d needs the checkpoint after frame %d, which shard %d/%d writes at its end; run "
+                        "it again when that is done, or give --preroll K for K frames of warm-up instead",
+                        st->sequence->manifest->name, shard[0], shard[1], st->sequence->frames.numbers[st->first - 1],
+                        shard[0] - 1, shard[1]);
+}
+
+static rl_code run_frames(batch_state *b, bool *stopped, rl_error *err)
+{
+    rl_batch batch = {.items = b->state.n_work,
+                      .in_flight = in_flight(b->s, b->q),
                       .load = batch_load,
                       .run = batch_run,
                       .write = batch_write,
                       .stop = batch_stop,
                       .ctx = b};
     size_t finished = 0;
+    announce(b->s, &b->state);
     rl_code code = rl_batch_run(&batch, &finished, err);
-    *stopped = finished < q->frames.n;
-    for (int i = 0; i < MOST_IN_FLIGHT; i++)
+    *stopped = finished < b->state.n_work;
+    if (!code)
+        rl_state_finish(&b->state, *stopped);
+    for (int i = 0; i < RL_MOST_IN_FLIGHT; i++)
         rl_frame_free(&b->frames[i]);
+    return code;
+}
+
+static rl_code run_sequence(rl_session *s, size_t sequence, const rl_run_hooks *hooks, size_t *done, size_t total,
+                            rl_run_summary *summary, bool *stopped, rl_error *err)
+{
+    batch_state *b = rl_calloc(1, sizeof *b);
+    if (!b)
+        return rl_fail_memory(err, sizeof *b);
+    b->s = s;
+    b->q = &s->sequences[sequence];
+    b->hooks = hooks;
+    b->summary = summary;
+    b->total = total;
+    rl_code code = rl_sequence_state_begin(&b->state, s, sequence, err);
+    summary->skipped += b->state.n_there;
+    b->done = *done + b->state.n_there;
+    if (!code && b->state.lacking) {
+        summary->lacking = true;
+        code = lacking(s, &b->state, err);
+    }
+    if (!code)
+        code = run_frames(b, stopped, err);
+    *done = b->done;
+    rl_sequence_state_end(&b->state);
     rl_free(b);
     return code;
 }
@@ -282,13 +337,16 @@ rl_code rl_session_run(rl_session *s, const rl_run_hooks *hooks, rl_run_summary 
     rl_code code = rl_folder_make(s->options.out ? s->options.out : "out", err);
     if (!code)
         code = rl_session_prepare(s, err);
-    size_t total = 0, done = 0;
-    for (size_t i = 0; i < s->n_sequences; i++)
-        total += s->sequences[i].frames.n;
+    size_t total = 0, done = 0, first, last;
+    for (size_t i = 0; i < s->n_sequences; i++) {
+        rl_session_range(s, i, &first, &last);
+        total += last - first;
+    }
     bool stopped = false;
     for (size_t i = 0; i < s->n_sequences && !code && !stopped; i++) {
-        code = run_sequence(s, &s->sequences[i], hooks, done, total, summary, &stopped, err);
-        done += s->sequences[i].frames.n;
+        rl_session_range(s, i, &first, &last);
+        if (last > first)
+            code = run_sequence(s, i, hooks, &done, total, summary, &stopped, err);
     }
     summary->peak_bytes = rl_alloc_peak();
     if (!code && stopped)

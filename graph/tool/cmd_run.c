@@ -34,7 +34,7 @@ int rl_cmd_run(rl_tool *tool, rl_error *err)
         *err = (rl_error){0}; /* what was asked for is no error */
         status = 128 + signal;
     } else if (code) {
-        status = summary.frames ? RL_EXIT_FRAME : RL_EXIT_WRONG;
+        status = summary.frames || summary.lacking ? RL_EXIT_FRAME : RL_EXIT_WRONG;
     } else {
         status = summary.failed ? RL_EXIT_FRAME : RL_EXIT_DONE;
     }

@@ -13,6 +13,7 @@ typedef enum kind {
     INTEGER, /* int, min … max */
     BYTES,   /* uint64_t */
     REGION,  /* int[4]: x, y, width, height */
+    SHARD,   /* int[2]: "I/N" */
     WORD     /* int, index into words */
 } kind;
 
@@ -56,6 +57,18 @@ static const option options[] = {
     {"on-missing", "WORD", SHARED, WORD, AT(on_missing), .words = "error|skip",
      .help = "what to do about an input frame that is missing:\n"
              "error (default), or skip it"},
+    {"resume", NULL, RL_CMD_RUN, FLAG, AT(run.resume),
+     .help = "keep the pictures that are there and whole, and go\n"
+             "on from the last checkpoint of their history"},
+    {"shard", "I/N", RL_CMD_RUN | RL_CMD_PLAN, SHARD, AT(run.shard),
+     .help = "the I-th of N parts: whole captures, or frame ranges\n"
+             "that take over history from the part before"},
+    {"preroll", "K", RL_CMD_RUN | RL_CMD_PLAN, INTEGER, AT(run.preroll), .min = 1, .max = 1000000,
+     .help = "a shard begins with K frames of warm-up instead; not\n"
+             "exact: `relit plan --shard` says how far off"},
+    {"checkpoint-frames", "N", RL_CMD_RUN, INTEGER, AT(run.checkpoint_frames), .min = 1, .max = 1000000,
+     .help = "save history every N frames; default: so often that\n"
+             "it takes 2 % of the time"},
     {"ocio", "FILE", SHARED, TEXT, AT(run.ocio),
      .help = "OpenColorIO config; default: the pipeline's, else\n"
              "$OCIO, else relit's own"},
@@ -146,6 +159,21 @@ static rl_code take_region(const parser *p, const option *o, const char *value, 
     return RL_OK;
 }
 
+static rl_code take_shard(const parser *p, const option *o, const char *value, int out[2])
+{
+    size_t n = strcspn(value, "/");
+    long long part, parts;
+    char *head = rl_arena_strndup(p->arena, value, n);
+    if (!head)
+        return rl_fail_memory(p->err, n);
+    if (value[n] != '/' || !rl_parse_int(head, &part) || !rl_parse_int(value + n + 1, &parts) || parts < 1 ||
+        parts > 1000000 || part < 1 || part > parts)
+        return wrong(p, o, "I/N with I from 1 to N, such as 2/8", value);
+    out[0] = (int)part;
+    out[1] = (int)parts;
+    return RL_OK;
+}
+
 static rl_code take_word(const parser *p, const option *o, const char *value, int *out)
 {
     int index = 0;
@@ -204,6 +232,8 @@ static rl_code take(const parser *p, const option *o, const char *value)
         return RL_OK;
     case REGION:
         return take_region(p, o, value, at);
+    case SHARD:
+        return take_shard(p, o, value, at);
     default:
         return take_word(p, o, value, at);
     }
@@ -304,6 +334,8 @@ rl_code rl_arguments_parse(rl_arena *arena, const rl_commands *commands, const r
     if (!code && !out->help && !out->operand && command->operand && command->operand[0] != '[')
         code = rl_fail_file(err, RL_E_USAGE, p.place, "needs a %s, see `relit %s --help`", command->operand,
                             command->name);
+    if (!code && out->run.preroll && !out->run.shard[1])
+        code = rl_fail_file(err, RL_E_USAGE, p.place, "--preroll is the warm-up of a shard: give --shard I/N too");
     if (!code && out->quiet && out->verbose)
         code = rl_fail_file(err, RL_E_USAGE, p.place, "--quiet and --verbose exclude each other");
     return code;

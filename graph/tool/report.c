@@ -210,7 +210,8 @@ void rl_report_run_end(rl_reporter *r, const rl_run_summary *s, bool stopped)
     pthread_mutex_lock(&r->lock);
     hide_bar(r);
     if (stopped)
-        fprintf(r->err, "stopped: %zu frames were finished, the others were not begun\n", s->frames);
+        fprintf(r->err, "stopped: %zu frames were finished, the others were not begun; the same command with --resume goes on\n",
+                s->frames);
     if (s->failed)
         fprintf(r->err, "%zu of %zu frames failed: %s\n", s->failed, s->frames, rl_str_text(&r->failed));
     if (!r->quiet)

@@ -1,0 +1,338 @@
+/* What a run of a sequence takes on, and what it leaves for the next one. */
+#include "graph/run/session_state.h"
+
+#include <stdio.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+#include <xxhash.h>
+
+#include "graph/base/alloc.h"
+#include "graph/base/file.h"
+#include "graph/run/session_checkpoint.h"
+
+bool rl_plan_has_history(const rl_plan *plan)
+{
+    for (size_t i = 0; i < plan->n_buffers; i++)
+        if (plan->buffers[i].kind == RL_BUFFER_HISTORY)
+            return true;
+    return false;
+}
+
+bool rl_sequence_is_cut(const rl_sequence *q, size_t i)
+{
+    const rl_manifest *m = q->manifest;
+    if (i == 0 || rl_frames_find(&m->cuts, q->frames.numbers[i]) >= 0)
+        return true;
+    return rl_frames_find(&m->frames, q->frames.numbers[i]) != rl_frames_find(&m->frames, q->frames.numbers[i - 1]) + 1;
+}
+
+void rl_session_range(const rl_session *s, size_t sequence, size_t *first, size_t *last)
+{
+    size_t n = s->sequences[sequence].frames.n, end = 0, before = 0;
+    *first = 0;
+    *last = n;
+    if (!s->options.shard[1])
+        return;
+    for (size_t i = 0; i <= sequence; i++) {
+        before = end;
+        end += s->sequences[i].frames.n;
+    }
+    size_t from = rl_session_shard_begin(s, (size_t)s->options.shard[0] - 1),
+           to = rl_session_shard_begin(s, (size_t)s->options.shard[0]);
+    from = from < before ? before : from > end ? end : from;
+    to = to < before ? before : to > end ? end : to;
+    *first = from - before;
+    *last = to - before;
+}
+
+size_t rl_session_shard_begin(const rl_session *s, size_t i)
+{
+    enum { MOST = 4096 };
+    size_t ends[MOST], sum = 0, n = s->n_sequences < MOST ? s->n_sequences : MOST;
+    for (size_t k = 0; k < n; k++) {
+        sum += s->sequences[k].frames.n;
+        ends[k] = sum;
+    }
+    return rl_shard_begin(i, (size_t)s->options.shard[1], ends, n);
+}
+
+/* ---- chains ---------------------------------------------------------------------------------------------- */
+
+static uint64_t extend(uint64_t chain, int frame, uint64_t content)
+{
+    uint64_t link[3] = {chain, (uint64_t)(int64_t)frame, content};
+    return XXH3_64bits(link, sizeof link);
+}
+
+static rl_inputs inputs_of(rl_sequence_state *st, size_t i, rl_error *err)
+{
+    const rl_sequence *q = st->sequence;
+    const rl_frames *listed = &q->manifest->frames;
+    rl_inputs in = {.missing = true};
+    bool hold = st->session->options.on_missing == RL_MISSING_HOLD;
+    rl_arena arena = {0};
+    /* A frame that is held is made of the files of the last one that is there. */
+    for (long k = rl_frames_find(listed, q->frames.numbers[i]); k >= 0 && in.missing; k--) {
+        const char *paths[RL_MOST_FILES];
+        size_t n;
+        if (rl_reader_paths(q->reader, listed->numbers[k], &arena, paths, &n, err))
+            break;
+        in = rl_ledger_inputs(st->ledger, listed->numbers[k], paths, n);
+        if (!hold)
+            break;
+    }
+    rl_arena_free(&arena);
+    return in;
+}
+
+/* What the chains of frames from…to-1 will be if none of them fails; a missing frame ends history. */
+static rl_code expect_chains(rl_sequence_state *st, size_t from, size_t to, uint64_t *chains, bool *missing,
+                             rl_error *err)
+{
+    uint64_t chain = st->root;
+    for (size_t i = from; i < to; i++) {
+        rl_inputs in = inputs_of(st, i, err);
+        if (err->code)
+            return err->code;
+        missing[i] = in.missing;
+        st->cut[i] |= i > from && missing[i - 1];
+        chain = extend(st->cut[i] ? st->root : chain, st->sequence->frames.numbers[i], in.content);
+        chains[i] = chain;
+    }
+    return RL_OK;
+}
+
+/* ---- what is there --------------------------------------------------------------------------------------- */
+
+static bool pictures_exist(rl_sequence_state *st, int frame)
+{
+    const rl_session *s = st->session;
+    rl_arena arena = {0};
+    bool all = true;
+    for (size_t i = 0; i < s->n_outputs && all; i++) {
+        const char *name, *path = NULL;
+        if (!rl_output_path(&arena, s->outputs[i].spec, st->sequence->manifest->name, frame, NULL, &name, NULL))
+            path = rl_path_join(&arena, s->options.out ? s->options.out : "out", name);
+        all = path && rl_path_exists(path);
+    }
+    rl_arena_free(&arena);
+    return all;
+}
+
+/* Pictures of this run's frames that need not be made again. */
+static void find_done(rl_sequence_state *st, const uint64_t *chains, const bool *missing, bool *needed)
+{
+    size_t others = 0;
+    for (size_t i = st->first + st->warm; i < st->last; i++) {
+        int frame = st->sequence->frames.numbers[i];
+        const rl_ledger_line *line = rl_ledger_find(st->ledger, frame);
+        bool there = line->kind == RL_LEDGER_DONE && pictures_exist(st, frame);
+        if (missing[i])
+            needed[i] = st->session->options.on_missing != RL_MISSING_SKIP;
+        else
+            needed[i] = !there || line->chain != chains[i];
+        others += there && line->chain != chains[i];
+        st->n_there += !needed[i];
+    }
+    if (others)
+        rl_report(st->session->log, RL_NOTE, RL_NOWHERE,
+                  "'%s': %zu frames are there, but made by another pipeline, version or device or from other inputs; they "
+                  "are made again",
+                  st->sequence->manifest->name, others);
+}
+
+/* ---- the work -------------------------------------------------------------------------------------------- */
+
+/* Used checkpoints are read once in full: one that is damaged is as good as none. */
+static bool all_readable(rl_sequence_state *st, bool *saved)
+{
+    bool good = true;
+    for (size_t i = 0; i < st->n_work; i++) {
+        if (st->work[i].start != RL_START_CHECKPOINT)
+            continue;
+        size_t before = st->work[i].frame - 1;
+        rl_checkpoint c = {0};
+        rl_error err = {0};
+        if (rl_state_load_checkpoint(st, st->sequence->frames.numbers[before], &c, &err)) {
+            rl_report(st->session->log, RL_WARNING, (rl_where){.file = err.file}, "%s; it is not used", err.text);
+            saved[before] = good = false;
+        }
+        rl_checkpoint_free(&c);
+    }
+    return good;
+}
+
+static void make_work(rl_sequence_state *st, const bool *needed, bool *saved)
+{
+    rl_schedule plan = {.first = st->first,
+                        .last = st->last,
+                        .cut = st->cut,
+                        .needed = needed,
+                        .saved = saved,
+                        .hand_over = st->hands_over};
+    do
+        st->n_work = rl_schedule_make(&plan, st->work, &st->lacking);
+    while (!all_readable(st, saved));
+    for (size_t i = 0; i < st->n_work; i++)
+        st->n_write += st->work[i].write;
+}
+
+/* Which frames have to be looked at: those of the run, and for a checkpoint's chain those since history began. */
+static size_t history_begins(const rl_sequence_state *st)
+{
+    size_t i = st->first;
+    while (i > 0 && !st->cut[i])
+        i--;
+    return i;
+}
+
+static rl_code decide(rl_sequence_state *st, rl_error *err)
+{
+    size_t n = st->sequence->frames.n;
+    uint64_t *chains = rl_arena_array(&st->arena, n + 1, sizeof *chains);
+    bool *missing = rl_arena_array(&st->arena, n + 1, sizeof *missing);
+    bool *needed = rl_arena_array(&st->arena, n + 1, sizeof *needed);
+    bool *saved = rl_arena_array(&st->arena, n + 1, sizeof *saved);
+    st->work = rl_arena_array(&st->arena, n + 1, sizeof *st->work);
+    if (!chains || !missing || !needed || !saved || !st->work)
+        return rl_fail_memory(err, n * sizeof *chains);
+    bool resume = st->session->options.resume;
+    size_t begin = history_begins(st);
+    for (size_t i = st->first + st->warm; i < st->last; i++)
+        needed[i] = true;
+    rl_code code = RL_OK;
+    if (resume || begin < st->first)
+        code = expect_chains(st, begin, resume ? st->last : st->first, chains, missing, err);
+    if (!code && resume)
+        find_done(st, chains, missing, needed);
+    if (!code && st->history)
+        code = rl_state_find_checkpoints(st, begin, resume ? st->last : st->first, chains, saved, err);
+    if (code)
+        return code;
+    make_work(st, needed, saved);
+    if (!st->lacking)
+        rl_state_drop_checkpoints(st, saved);
+    return RL_OK;
+}
+
+/* ---- beginning and end ----------------------------------------------------------------------------------- */
+
+static void find_range(rl_sequence_state *st, size_t sequence)
+{
+    rl_session *s = st->session;
+    const rl_sequence *q = st->sequence;
+    rl_session_range(s, sequence, &st->first, &st->last);
+    for (size_t i = 0; i < q->frames.n; i++)
+        st->cut[i] = !st->history || rl_sequence_is_cut(q, i);
+    st->hands_over = st->last < q->frames.n && st->last > st->first && !st->cut[st->last] && !s->options.preroll;
+    while (s->options.preroll && st->last > st->first && st->warm < (size_t)s->options.preroll && !st->cut[st->first]) {
+        st->first--;
+        st->warm++;
+    }
+    if (s->options.preroll && st->last > st->first)
+        st->cut[st->first] = true;
+}
+
+rl_code rl_sequence_state_begin(rl_sequence_state *st, rl_session *s, size_t sequence, rl_error *err)
+{
+    rl_sequence *q = &s->sequences[sequence];
+    char tag[64] = "";
+    *st = (rl_sequence_state){.session = s, .sequence = q, .history = rl_plan_has_history(q->plan)};
+    st->folder = rl_path_join(&st->arena, s->options.out ? s->options.out : "out", ".relit");
+    st->name = rl_ledger_name(&st->arena, q->manifest->name);
+    st->cut = rl_arena_array(&st->arena, q->frames.n + 1, sizeof *st->cut);
+    st->kept = rl_arena_array(&st->arena, q->frames.n + 1, sizeof *st->kept);
+    if (!st->folder || !st->name || !st->cut || !st->kept)
+        return rl_fail_memory(err, q->frames.n * sizeof *st->kept);
+    find_range(st, sequence);
+    if (s->options.shard[1])
+        snprintf(tag, sizeof tag, "%d-of-%d", s->options.shard[0], s->options.shard[1]);
+    rl_code code = rl_folder_make(st->folder, err);
+    if (!code)
+        code = rl_session_identity(s, q, &st->identity, err);
+    st->root = XXH3_64bits(&st->identity, sizeof st->identity);
+    if (!code)
+        code = rl_ledger_open(st->folder, st->name, tag, &q->manifest->frames, &st->ledger, err);
+    if (!code)
+        code = decide(st, err);
+    st->saved_at = rl_state_now();
+    return code;
+}
+
+void rl_sequence_state_end(rl_sequence_state *st)
+{
+    for (int i = 0; i < RL_MOST_IN_FLIGHT; i++)
+        rl_checkpoint_free(&st->slots[i].saved);
+    rl_ledger_close(&st->ledger);
+    rl_arena_free(&st->arena);
+    *st = (rl_sequence_state){0};
+}
+
+/* ---- the stages ------------------------------------------------------------------------------------------ */
+
+void rl_state_loaded(rl_sequence_state *st, int slot, const rl_frame *f)
+{
+    const char *paths[RL_MOST_FILES];
+    size_t n = 0;
+    for (int i = 0; i < RL_MOST_FILES; i++)
+        if (f->files[i])
+            paths[n++] = rl_exr_path(f->files[i]);
+    st->slots[slot].inputs = rl_ledger_inputs(st->ledger, f->number, paths, n);
+}
+
+rl_code rl_state_ready(rl_sequence_state *st, const rl_work *w, int slot, int frame, bool *restored, int *previous,
+                       camera_t *camera, rl_error *err)
+{
+    rl_slot_state *slot_state = &st->slots[slot];
+    rl_code code = RL_OK;
+    *restored = false;
+    if (slot_state->saved_s > 0) /* the last one that came out of this slot */
+        st->cost_s = slot_state->saved_s;
+    slot_state->saved_s = 0;
+    if (w->start == RL_START_CHECKPOINT) {
+        code = rl_state_restore(st, st->sequence->frames.numbers[w->frame - 1], previous, camera, err);
+        *restored = !code;
+    }
+    bool alone = !st->chained || st->cut[w->frame];
+    slot_state->chain = extend(alone ? st->root : st->chain, frame, slot_state->inputs.content);
+    return code;
+}
+
+void rl_state_ran(rl_sequence_state *st, const rl_work *w, int slot, const rl_frame *f, bool good)
+{
+    rl_slot_state *slot_state = &st->slots[slot];
+    st->chained = good;
+    st->chain = slot_state->chain;
+    st->last_frame = f->number;
+    st->since++;
+    if (good && st->history && rl_state_is_due(st))
+        rl_state_take(st, slot_state);
+    (void)w;
+}
+
+rl_code rl_state_writing(rl_sequence_state *st, int slot, int frame, rl_error *err)
+{
+    const rl_slot_state *slot_state = &st->slots[slot];
+    if (rl_ledger_find(st->ledger, frame)->kind == RL_LEDGER_NONE)
+        return RL_OK;
+    return rl_ledger_write(st->ledger, frame, RL_LEDGER_BEGUN, slot_state->chain, &slot_state->inputs, err);
+}
+
+void rl_state_written(rl_sequence_state *st, const rl_work *w, int slot, const rl_frame *f)
+{
+    rl_slot_state *slot_state = &st->slots[slot];
+    rl_error err = {0};
+    bool failed = f->error.code != RL_OK;
+    if (failed)
+        rl_state_pin(st);
+    if (w->write)
+        rl_ledger_write(st->ledger, f->number, failed ? RL_LEDGER_FAILED : RL_LEDGER_DONE, slot_state->chain,
+                        &slot_state->inputs, &err);
+    if (!err.code)
+        rl_state_store(st, slot_state, &err);
+    if (err.code)
+        rl_report(st->session->log, RL_WARNING, (rl_where){.file = err.file},
+                  "%s; the run goes on, but --resume will make some frames again", err.text);
+    rl_checkpoint_free(&slot_state->saved);
+}
