@@ -9,6 +9,7 @@
 
 #include "graph/base/alloc.h"
 #include "graph/base/file.h"
+#include "graph/run/leftovers.h"
 #include "graph/run/session_checkpoint.h"
 
 bool rl_plan_has_history(const rl_plan *plan)
@@ -187,6 +188,30 @@ static size_t history_begins(const rl_sequence_state *st)
     return i;
 }
 
+/* What a killed run left of the files that this one will write. */
+static void clean_up(rl_sequence_state *st)
+{
+    const rl_session *s = st->session;
+    rl_arena arena = {0};
+    size_t n = 0;
+    const char **paths = rl_arena_array(&arena, st->n_work * (s->n_outputs + 1) + 1, sizeof *paths);
+    for (size_t w = 0; paths && w < st->n_work; w++) {
+        int frame = st->sequence->frames.numbers[st->work[w].frame];
+        paths[n] = rl_checkpoint_path(&arena, st->folder, st->name, frame);
+        n += paths[n] != NULL;
+        for (size_t i = 0; i < s->n_outputs && st->work[w].write; i++) {
+            const char *name;
+            if (rl_output_path(&arena, s->outputs[i].spec, st->sequence->manifest->name, frame, NULL, &name, NULL))
+                continue;
+            paths[n] = rl_path_join(&arena, s->options.out ? s->options.out : "out", name);
+            n += paths[n] != NULL;
+        }
+    }
+    if (paths)
+        rl_leftovers_remove(paths, n);
+    rl_arena_free(&arena);
+}
+
 static rl_code decide(rl_sequence_state *st, rl_error *err)
 {
     size_t n = st->sequence->frames.n;
@@ -211,8 +236,10 @@ static rl_code decide(rl_sequence_state *st, rl_error *err)
     if (code)
         return code;
     make_work(st, needed, saved);
-    if (!st->lacking)
+    if (!st->lacking) {
         rl_state_drop_checkpoints(st, saved);
+        clean_up(st);
+    }
     return RL_OK;
 }
 
