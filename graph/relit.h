@@ -64,7 +64,6 @@ typedef struct rl_options {
     int shard[2];          /* {I, N}: the I-th of N parts, from 1; N = 0: everything */
     int preroll;           /* frames of warm-up before a shard's first; 0 = history comes from the shard before it */
     int checkpoint_frames; /* a checkpoint of history every so many frames; 0 = by what one costs */
-    const char *trace;     /* a file for what ran when, as Chrome trace events; NULL = none */
     const char *ocio; /* OpenColorIO config; NULL = the pipeline's, else $OCIO, else relit's own */
     const rl_log *log;
 } rl_options;
@@ -108,8 +107,21 @@ typedef struct rl_frame_result {
     size_t done, total;            /* frames of the whole run, this one included */
 } rl_frame_result;
 
+/* What took which time: a stage of a frame (category "read", "run", "write", "checkpoint"), an output that was written
+ * ("encode"), or a step on the device ("kernel", "colour", "convert", "copy"). */
+typedef enum rl_lane { RL_LANE_READ, RL_LANE_RUN, RL_LANE_DEVICE, RL_LANE_WRITE, RL_LANES } rl_lane;
+
+typedef struct rl_run_span {
+    rl_lane lane; /* the thread, or the device's queue; spans of one lane nest or follow each other */
+    const char *category, *name, *capture; /* live during the callback */
+    long long frame;
+    uint64_t start, end; /* ns on CLOCK_MONOTONIC */
+} rl_run_span;
+
 typedef struct rl_run_hooks {
     void (*frame)(void *ctx, const rl_frame_result *result); /* in order of completion, one at a time */
+    void (*stage)(void *ctx, rl_lane lane, long long frame);    /* begins to read, run or write it; any thread; may be NULL */
+    void (*span)(void *ctx, const rl_run_span *span);           /* any thread, several at a time; may be NULL */
     int (*stop)(void *ctx); /* asked before each frame: nonzero finishes the frames in flight and returns
                                RL_E_CANCELLED */
     void *ctx;

@@ -77,8 +77,10 @@ void rl_session_light_values(const rl_sequence *sequence, const camera_t *camera
 rl_code rl_session_sequences(rl_session *session, rl_error *err);
 void rl_sequence_close(rl_sequence *sequence);
 
-/* session_run.c: runs the kernels on a loaded frame. `cut`: history does not reach here. */
-rl_code rl_session_execute(rl_session *session, rl_sequence *sequence, rl_frame *frame, bool cut, rl_error *err);
+/* session_run.c: runs the kernels on a loaded frame. `cut`: history does not reach here. `spans`: NULL, or plan->n_steps
+ * of them. */
+rl_code rl_session_execute(rl_session *session, rl_sequence *sequence, rl_frame *frame, bool cut, rl_span *spans,
+                           rl_error *err);
 /* Where the planes of a graph output's image are, mapped; unmap with the memory. */
 rl_code rl_session_map_image(const rl_sequence *sequence, const rl_frame *frame, int buffer, rl_sink_image *out,
                              rl_memory **memory, rl_error *err);

@@ -1,21 +1,13 @@
 /* Frames through a session: in batches from files to files, or one at a time. */
 #include <string.h>
-#include <time.h>
 
 #include "graph/base/alloc.h"
 #include "graph/base/file.h"
 #include "graph/run/batch.h"
 #include "graph/run/camera.h"
-#include "graph/run/session_state.h"
+#include "graph/run/session_notes.h"
 
 enum { MOST_OUTPUT_FILES = 64 };
-
-static double now_s(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
 
 /* Buffers follow the size of the frame that they hold. */
 static rl_code fit_buffers(rl_sequence *q, rl_frame *f, const rl_geometry *before, rl_error *err)
@@ -26,7 +18,8 @@ static rl_code fit_buffers(rl_sequence *q, rl_frame *f, const rl_geometry *befor
     return rl_frame_buffers_new(q->executor, &f->geometry, &f->buffers, err);
 }
 
-rl_code rl_session_execute(rl_session *s, rl_sequence *q, rl_frame *f, bool cut, rl_error *err)
+rl_code rl_session_execute(rl_session *s, rl_sequence *q, rl_frame *f, bool cut, rl_span *spans,
+                           rl_error *err)
 {
     (void)s;
     rl_code code = rl_executor_resize(q->executor, &f->geometry, err);
@@ -37,7 +30,7 @@ rl_code rl_session_execute(rl_session *s, rl_sequence *q, rl_frame *f, bool cut,
     rl_session_light_values(q, &f->camera, q->light_values);
     rl_frame_values values = {
         .number = f->number, .camera = f->camera, .lights = q->light_values, .n_lights = (int)q->n_lights};
-    return rl_executor_run(q->executor, f->buffers, &values, NULL, err);
+    return rl_executor_run(q->executor, f->buffers, &values, spans, err);
 }
 
 /* ---- writing --------------------------------------------------------------------------------------------- */
@@ -102,8 +95,8 @@ static rl_code write_output(rl_session *s, rl_sequence *q, rl_frame *f, size_t o
     return code;
 }
 
-static rl_code write_frame(rl_session *s, rl_sequence *q, rl_frame *f, rl_arena *arena, const char **files,
-                           size_t *n_files, rl_error *err)
+static rl_code write_frame(rl_session *s, rl_sequence *q, rl_frame *f, const rl_run_hooks *hooks, rl_arena *arena,
+                           const char **files, size_t *n_files, rl_error *err)
 {
     rl_sink_image stencil = {0};
     rl_memory *memory = NULL;
@@ -119,6 +112,7 @@ static rl_code write_frame(rl_session *s, rl_sequence *q, rl_frame *f, rl_arena 
                            .pipeline = rl_arena_printf(arena, "%s %016llx", s->pipeline->name, s->pipeline->hash)};
     for (size_t i = 0; i < s->n_outputs && !code; i++) {
         const char *name = NULL;
+        double start = rl_state_now();
         code = rl_output_path(arena, s->outputs[i].spec, q->manifest->name, f->number, NULL, &name, err);
         const char *path = code ? NULL : rl_path_join(arena, s->options.out ? s->options.out : "out", name);
         if (!code && !path)
@@ -127,6 +121,7 @@ static rl_code write_frame(rl_session *s, rl_sequence *q, rl_frame *f, rl_arena 
             code = write_output(s, q, f, i, &frame, path, err);
         if (!code && *n_files < MOST_OUTPUT_FILES)
             files[(*n_files)++] = path;
+        rl_session_span(hooks, q, f, RL_LANE_WRITE, "encode", s->outputs[i].spec->name, start);
     }
     if (memory)
         rl_memory_unmap(memory, NULL);
@@ -144,6 +139,7 @@ typedef struct batch_state {
     rl_run_summary *summary;
     size_t done, total; /* frames of all captures that this run writes */
     rl_sequence_state state;
+    rl_span *spans; /* [plan->n_steps] when somebody wants to know */
     bool history; /* the frame before this one ran, without a gap */
     int previous;
     camera_t camera;
@@ -154,13 +150,14 @@ static void batch_load(void *ctx, size_t item, int slot)
     batch_state *b = ctx;
     rl_frame *f = &b->frames[slot];
     rl_geometry before = f->geometry;
-    double start = now_s();
+    double start = rl_state_now();
     f->number = b->q->frames.numbers[b->state.work[item].frame];
     f->error = (rl_error){0};
     f->run_s = f->write_s = 0;
     f->clipped = 0;
     b->skipped[slot] = false;
     b->state.slots[slot].inputs = (rl_inputs){.missing = true};
+    rl_session_stage(b->hooks, RL_LANE_READ, f);
     if (!rl_reader_open(b->q->reader, f->number, f, &f->error) && !fit_buffers(b->q, f, &before, &f->error))
         rl_reader_pixels(b->q->reader, f, b->s->pool, &f->error);
     if (f->error.code == RL_E_IO && b->s->options.on_missing == RL_MISSING_SKIP) {
@@ -170,7 +167,8 @@ static void batch_load(void *ctx, size_t item, int slot)
     }
     if (!f->error.code)
         rl_state_loaded(&b->state, slot, f);
-    f->load_s = now_s() - start;
+    f->load_s = rl_state_now() - start;
+    rl_session_span(b->hooks, b->q, f, RL_LANE_READ, "read", "decode", start);
 }
 
 /* History ends where the manifest says, at a gap of the numbers, after a frame that failed, at a jump of the camera. */
@@ -188,19 +186,23 @@ static void batch_run(void *ctx, size_t item, int slot)
     batch_state *b = ctx;
     rl_frame *f = &b->frames[slot];
     const rl_work *work = &b->state.work[item];
-    double start = now_s();
+    double start = rl_state_now();
     bool restored = false;
+    rl_session_stage(b->hooks, RL_LANE_RUN, f);
     if (!f->error.code)
         rl_state_ready(&b->state, work, slot, f->number, &restored, &b->previous, &b->camera, &f->error);
     b->history = restored || (b->history && work->start == RL_START_ON);
     bool cut = f->error.code || is_cut(b, f);
     if (!f->error.code)
-        rl_session_execute(b->s, b->q, f, cut, &f->error);
+        rl_session_execute(b->s, b->q, f, cut, b->spans, &f->error);
+    if (!f->error.code)
+        rl_session_step_spans(b->hooks, b->s, b->q, f, b->spans);
     rl_state_ran(&b->state, work, slot, f, !f->error.code);
     b->history = !f->error.code;
     b->previous = f->number;
     b->camera = f->camera;
-    f->run_s = now_s() - start;
+    f->run_s = rl_state_now() - start;
+    rl_session_span(b->hooks, b->q, f, RL_LANE_RUN, "run", "kernels", start);
 }
 
 static void batch_write(void *ctx, size_t item, int slot)
@@ -210,12 +212,14 @@ static void batch_write(void *ctx, size_t item, int slot)
     rl_arena arena = {0};
     const char *files[MOST_OUTPUT_FILES];
     size_t n_files = 0;
-    double start = now_s();
+    double start = rl_state_now();
     const rl_work *work = &b->state.work[item];
+    rl_session_stage(b->hooks, RL_LANE_WRITE, f);
     if (!f->error.code && work->write && !rl_state_writing(&b->state, slot, f->number, &f->error))
-        write_frame(b->s, b->q, f, &arena, files, &n_files, &f->error);
+        write_frame(b->s, b->q, f, b->hooks, &arena, files, &n_files, &f->error);
     rl_state_written(&b->state, work, slot, f);
-    f->write_s = now_s() - start;
+    f->write_s = rl_state_now() - start;
+    rl_session_span(b->hooks, b->q, f, RL_LANE_WRITE, "write", "write", start);
     rl_frame_release(f);
     if (b->skipped[slot])
         f->error = (rl_error){0};
@@ -259,30 +263,6 @@ static int in_flight(const rl_session *s, const rl_sequence *q)
     return n;
 }
 
-/* What a sequence's state says before its frames run. */
-static void announce(const rl_session *s, const rl_sequence_state *st)
-{
-    const char *name = st->sequence->manifest->name;
-    if (s->options.resume && st->n_there)
-        rl_report(s->log, RL_NOTE, RL_NOWHERE, "'%s': %zu frames are there already", name, st->n_there);
-    if (st->n_work && st->work[0].start == RL_START_CHECKPOINT)
-        rl_report(s->log, RL_NOTE, RL_NOWHERE, "'%s': going on from the checkpoint after frame %d", name,
-                  st->sequence->frames.numbers[st->work[0].frame - 1]);
-    if (st->n_work > st->n_write)
-        rl_report(s->log, RL_NOTE, RL_NOWHERE, "'%s': %zu frames are processed for their history only", name,
-                  st->n_work - st->n_write);
-}
-
-static rl_code lacking(const rl_session *s, const rl_sequence_state *st, rl_error *err)
-{
-    const int *shard = s->options.shard;
-    return rl_fail_file(err, RL_E_IO, st->folder,
-                        "'%s': shard %d/%d needs the checkpoint after frame %d, which shard %d/%d writes at its end; run "
-                        "it again when that is done, or give --preroll K for K frames of warm-up instead",
-                        st->sequence->manifest->name, shard[0], shard[1], st->sequence->frames.numbers[st->first - 1],
-                        shard[0] - 1, shard[1]);
-}
-
 static rl_code run_frames(batch_state *b, bool *stopped, rl_error *err)
 {
     rl_batch batch = {.items = b->state.n_work,
@@ -293,7 +273,9 @@ static rl_code run_frames(batch_state *b, bool *stopped, rl_error *err)
                       .stop = batch_stop,
                       .ctx = b};
     size_t finished = 0;
-    announce(b->s, &b->state);
+    rl_state_announce(&b->state);
+    if (b->hooks && b->hooks->span)
+        b->spans = rl_arena_array(&b->state.arena, b->q->plan->n_steps + 1, sizeof *b->spans);
     rl_code code = rl_batch_run(&batch, &finished, err);
     *stopped = finished < b->state.n_work;
     if (!code)
@@ -319,7 +301,7 @@ static rl_code run_sequence(rl_session *s, size_t sequence, const rl_run_hooks *
     b->done = *done + b->state.n_there;
     if (!code && b->state.lacking) {
         summary->lacking = true;
-        code = lacking(s, &b->state, err);
+        code = rl_state_lacks(&b->state, err);
     }
     if (!code)
         code = run_frames(b, stopped, err);
@@ -386,7 +368,7 @@ rl_code rl_session_process(rl_session *s, size_t capture, long long number, cons
     if (!code)
         code = data ? rl_reader_memory_pixels(q->reader, data, f, s->pool, err) : rl_reader_pixels(q->reader, f, s->pool, err);
     if (!code)
-        code = rl_session_execute(s, q, f, false, err);
+        code = rl_session_execute(s, q, f, false, NULL, err);
     s->processed = !code;
     return code;
 }

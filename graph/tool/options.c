@@ -85,6 +85,9 @@ static const option options[] = {
     {"json", NULL, SHARED | RL_CMD_PASSES | RL_CMD_DEVICES, FLAG, AT(json),
      .help = "print JSON on stdout (run: an object a frame, each\n"
              "on its line)"},
+    {"trace", "F.json", RL_CMD_RUN, TEXT, AT(trace),
+     .help = "write what ran when, for ui.perfetto.dev or\n"
+             "chrome://tracing"},
     {"quiet", NULL, EVERY, FLAG, AT(quiet),
      .help = "print errors and warnings only: no notes, no progress"},
     {"verbose", NULL, EVERY, FLAG, AT(verbose),

@@ -40,6 +40,7 @@ typedef enum rl_plan_word { RL_WORD_TEXT, RL_WORD_DOT, RL_WORD_SVG, RL_WORD_JSON
 typedef struct rl_arguments {
     const char *operand;    /* or NULL */
     rl_options run;         /* handed to rl_session_open as it is, after .pipeline and .log are set */
+    const char *trace;      /* or NULL */
     int on_missing, format; /* words, as indices of rl_on_missing and rl_plan_word */
     bool json, quiet, verbose, help;
 } rl_arguments;
