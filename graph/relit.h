@@ -91,6 +91,28 @@ rl_code rl_session_plan(const rl_session *session, size_t capture, rl_plan_forma
                         rl_error *err);
 void rl_text_free(char *text);
 
+/* What a run with options.shard does to a capture. */
+typedef struct rl_shard_part {
+    size_t n;                    /* frames that it writes; 0: none, and nothing below counts */
+    long long first, last;       /* the first and the last of them */
+    bool history;                /* the graph keeps history */
+    size_t preroll;              /* frames of warm-up before them, fewer than asked for behind a cut: then exact */
+    bool exact;                  /* the pictures are those of one run over all frames, bit for bit */
+    bool takes_over, hands_over; /* history, from the checkpoint after frame `from`; after its last frame */
+    long long from;
+} rl_shard_part;
+void rl_session_shard(const rl_session *session, size_t capture, rl_shard_part *out);
+
+/* A node that keeps history: the least share that a frame has in its result, < 0 when the pass does not say. What lies
+ * before K frames of warm-up then has at most the share (1 - least)^(K+1) in the first picture behind them. */
+typedef struct rl_fading {
+    const char *node, *pass;
+    double least;
+    const char *where; /* where that holds; NULL when least < 0 */
+} rl_fading;
+/* The i-th of a capture's live nodes with history; false when there is none. */
+bool rl_session_fading(const rl_session *session, size_t capture, size_t i, rl_fading *out);
+
 /* ---- processing files ------------------------------------------------------------------------------------
  */
 

@@ -9,9 +9,6 @@ extern "C" {
 #endif
 
 double rl_state_now(void); /* s on the monotonic clock */
-/* The index, over the frames of all captures, at which the i-th part of a run with --shard begins. */
-size_t rl_session_shard_begin(const rl_session *session, size_t i);
-
 /* saved[i] for frames from…to-1 whose checkpoint is there and of this run; says why others are refused. */
 rl_code rl_state_find_checkpoints(rl_sequence_state *state, size_t from, size_t to, const uint64_t *chains, bool *saved,
                                   rl_error *err);

@@ -319,15 +319,16 @@ rl_code rl_session_run(rl_session *s, const rl_run_hooks *hooks, rl_run_summary 
     rl_code code = rl_folder_make(s->options.out ? s->options.out : "out", err);
     if (!code)
         code = rl_session_prepare(s, err);
-    size_t total = 0, done = 0, first, last;
+    size_t total = 0, done = 0;
+    rl_part part;
     for (size_t i = 0; i < s->n_sequences; i++) {
-        rl_session_range(s, i, &first, &last);
-        total += last - first;
+        rl_session_part(s, i, &part);
+        total += part.last - part.first - part.warm;
     }
     bool stopped = false;
     for (size_t i = 0; i < s->n_sequences && !code && !stopped; i++) {
-        rl_session_range(s, i, &first, &last);
-        if (last > first)
+        rl_session_part(s, i, &part);
+        if (part.last > part.first)
             code = run_sequence(s, i, hooks, &done, total, summary, &stopped, err);
     }
     summary->peak_bytes = rl_alloc_peak();

@@ -12,52 +12,6 @@
 #include "graph/run/leftovers.h"
 #include "graph/run/session_checkpoint.h"
 
-bool rl_plan_has_history(const rl_plan *plan)
-{
-    for (size_t i = 0; i < plan->n_buffers; i++)
-        if (plan->buffers[i].kind == RL_BUFFER_HISTORY)
-            return true;
-    return false;
-}
-
-bool rl_sequence_is_cut(const rl_sequence *q, size_t i)
-{
-    const rl_manifest *m = q->manifest;
-    if (i == 0 || rl_frames_find(&m->cuts, q->frames.numbers[i]) >= 0)
-        return true;
-    return rl_frames_find(&m->frames, q->frames.numbers[i]) != rl_frames_find(&m->frames, q->frames.numbers[i - 1]) + 1;
-}
-
-void rl_session_range(const rl_session *s, size_t sequence, size_t *first, size_t *last)
-{
-    size_t n = s->sequences[sequence].frames.n, end = 0, before = 0;
-    *first = 0;
-    *last = n;
-    if (!s->options.shard[1])
-        return;
-    for (size_t i = 0; i <= sequence; i++) {
-        before = end;
-        end += s->sequences[i].frames.n;
-    }
-    size_t from = rl_session_shard_begin(s, (size_t)s->options.shard[0] - 1),
-           to = rl_session_shard_begin(s, (size_t)s->options.shard[0]);
-    from = from < before ? before : from > end ? end : from;
-    to = to < before ? before : to > end ? end : to;
-    *first = from - before;
-    *last = to - before;
-}
-
-size_t rl_session_shard_begin(const rl_session *s, size_t i)
-{
-    enum { MOST = 4096 };
-    size_t ends[MOST], sum = 0, n = s->n_sequences < MOST ? s->n_sequences : MOST;
-    for (size_t k = 0; k < n; k++) {
-        sum += s->sequences[k].frames.n;
-        ends[k] = sum;
-    }
-    return rl_shard_begin(i, (size_t)s->options.shard[1], ends, n);
-}
-
 /* ---- chains ---------------------------------------------------------------------------------------------- */
 
 static uint64_t extend(uint64_t chain, int frame, uint64_t content)
@@ -247,18 +201,16 @@ static rl_code decide(rl_sequence_state *st, rl_error *err)
 
 static void find_range(rl_sequence_state *st, size_t sequence)
 {
-    rl_session *s = st->session;
-    const rl_sequence *q = st->sequence;
-    rl_session_range(s, sequence, &st->first, &st->last);
-    for (size_t i = 0; i < q->frames.n; i++)
-        st->cut[i] = !st->history || rl_sequence_is_cut(q, i);
-    st->hands_over = st->last < q->frames.n && st->last > st->first && !st->cut[st->last] && !s->options.preroll;
-    while (s->options.preroll && st->last > st->first && st->warm < (size_t)s->options.preroll && !st->cut[st->first]) {
-        st->first--;
-        st->warm++;
-    }
-    if (s->options.preroll && st->last > st->first)
-        st->cut[st->first] = true;
+    rl_part part;
+    rl_session_part(st->session, sequence, &part);
+    st->first = part.first;
+    st->last = part.last;
+    st->warm = part.warm;
+    st->hands_over = part.hands_over;
+    for (size_t i = 0; i < st->sequence->frames.n; i++)
+        st->cut[i] = !st->history || rl_sequence_is_cut(st->sequence, i);
+    if (st->session->options.preroll && part.last > part.first)
+        st->cut[part.first] = true;
 }
 
 rl_code rl_sequence_state_begin(rl_sequence_state *st, rl_session *s, size_t sequence, rl_error *err)

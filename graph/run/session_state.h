@@ -57,8 +57,13 @@ typedef struct rl_sequence_state {
     rl_slot_state slots[RL_MOST_IN_FLIGHT];
 } rl_sequence_state;
 
-/* The part of the sequence's frames that belongs to this run's shard: all without --shard. */
-void rl_session_range(const rl_session *session, size_t sequence, size_t *first, size_t *last);
+/* session_shard.c: the part of a sequence's frames that belongs to this run's shard: all without --shard. */
+typedef struct rl_part {
+    size_t first, last; /* indices; last is not in it. Warm-up included */
+    size_t warm;        /* frames of it that are warm-up */
+    bool hands_over;    /* another shard goes on behind it */
+} rl_part;
+void rl_session_part(const rl_session *session, size_t sequence, rl_part *out);
 /* Whether no history reaches frame i, as far as the manifest and the numbers tell. */
 bool rl_sequence_is_cut(const rl_sequence *sequence, size_t i);
 bool rl_plan_has_history(const rl_plan *plan);
