@@ -58,30 +58,45 @@ static uint64_t check_of(const header *h)
     return XXH3_64bits(h, offsetof(header, check));
 }
 
+static void fill_header(header *h, const rl_checkpoint *c)
+{
+    memset(h, 0, sizeof *h); /* paddings too: they are hashed */
+    memcpy(h->magic, magic, sizeof magic);
+    h->order = ORDER;
+    h->size = sizeof *h;
+    h->identity = c->identity;
+    h->chain = c->chain;
+    h->frame = c->frame;
+    h->geometry = c->geometry;
+    h->previous = c->previous;
+    h->bytes = c->bytes;
+    h->content = XXH3_64bits(c->history, c->bytes);
+    h->check = check_of(h);
+}
+
+/* Not through rl_file_write: history is large, and there is one copy of it already. */
 rl_code rl_checkpoint_write(const char *path, const rl_checkpoint *c, rl_error *err)
 {
-    size_t room = sizeof(header) + c->bytes;
-    char *whole = rl_calloc(1, room);
-    if (!whole)
-        return rl_fail_memory(err, room);
+    char temp[4096];
     header h;
-    memset(&h, 0, sizeof h); /* paddings too: they are hashed */
-    memcpy(h.magic, magic, sizeof magic);
-    h.order = ORDER;
-    h.size = sizeof h;
-    h.identity = c->identity;
-    h.chain = c->chain;
-    h.frame = c->frame;
-    h.geometry = c->geometry;
-    h.previous = c->previous;
-    h.bytes = c->bytes;
-    h.content = XXH3_64bits(c->history, c->bytes);
-    h.check = check_of(&h);
-    memcpy(whole, &h, sizeof h);
-    memcpy(whole + sizeof h, c->history, c->bytes);
-    rl_code code = rl_file_write(path, whole, room, err);
-    rl_free(whole);
-    return code;
+    fill_header(&h, c);
+    rl_code code = rl_file_temp(path, temp, sizeof temp, err);
+    if (code)
+        return code;
+    FILE *f = fopen(temp, "wbxe");
+    if (f)
+        setvbuf(f, NULL, _IONBF, 0);
+    bool good = f && fwrite(&h, sizeof h, 1, f) == 1 && (!c->bytes || fwrite(c->history, c->bytes, 1, f) == 1);
+    int why = errno;
+    if (f && fclose(f) && good) {
+        good = false;
+        why = errno;
+    }
+    if (good)
+        return rl_file_commit(temp, path, err);
+    if (f)
+        rl_file_discard(temp);
+    return rl_fail_file(err, RL_E_IO, path, "cannot be written: %s", strerror(why));
 }
 
 static rl_code read_header(FILE *f, const char *path, header *h, rl_error *err)

@@ -38,6 +38,7 @@ typedef struct rl_sequence {
     const rl_graph *graph;
     const rl_plan *plan;
     rl_geometry geometry; /* of the first frame */
+    uint64_t decode_bytes; /* that reading it takes besides its buffers */
     rl_reader *reader;
     rl_executor *executor; /* NULL until prepared */
 } rl_sequence;
@@ -84,6 +85,21 @@ rl_code rl_session_execute(rl_session *session, rl_sequence *sequence, rl_frame 
 /* Where the planes of a graph output's image are, mapped; unmap with the memory. */
 rl_code rl_session_map_image(const rl_sequence *sequence, const rl_frame *frame, int buffer, rl_sink_image *out,
                              rl_memory **memory, rl_error *err);
+
+/* session_memory.c: bytes that a run of a sequence allocates at most with so many frames in flight, saturating: the
+ * plan's buffers, and what reading, writing and checkpoints take besides. 0 when the size is not known (frames in
+ * memory). */
+typedef struct rl_memory_need {
+    size_t plan, decode, encode, checkpoint, total;
+} rl_memory_need;
+void rl_session_need(const rl_session *session, const rl_sequence *sequence, int in_flight, rl_memory_need *out);
+/* As many frames as overlap usefully and as the memory limit lets be in flight. */
+enum { RL_MOST_IN_FLIGHT = 3 }; /* one is read, one runs, one is written */
+int rl_session_in_flight(const rl_session *session, const rl_sequence *sequence);
+/* Adds it to a printed plan. */
+rl_code rl_session_print_need(const rl_session *session, const rl_sequence *sequence, bool json, rl_str *text,
+                              rl_error *err);
+rl_code rl_session_check_memory(const rl_session *session, rl_error *err);
 
 #ifdef __cplusplus
 }

@@ -182,6 +182,11 @@ static rl_code make_reader(rl_session *s, rl_sequence *q, rl_error *err)
     rl_frame first = {.number = q->frames.numbers[0]};
     code = rl_reader_open(q->reader, q->frames.numbers[0], &first, err);
     q->geometry = first.geometry;
+    for (int i = 0; i < RL_MOST_FILES && !code; i++)
+        for (int part = 0; first.files[i] && part < rl_exr_parts(first.files[i]); part++) {
+            uint64_t bytes = rl_exr_read_scratch(first.files[i], part, s->threads);
+            q->decode_bytes = bytes > q->decode_bytes ? bytes : q->decode_bytes;
+        }
     rl_frame_free(&first);
     return code;
 }

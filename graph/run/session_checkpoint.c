@@ -130,6 +130,8 @@ rl_code rl_state_restore(rl_sequence_state *st, int frame, int *previous, camera
 bool rl_state_is_due(const rl_sequence_state *st)
 {
     int every = st->session->options.checkpoint_frames;
+    if (__atomic_load_n(&st->pending, __ATOMIC_ACQUIRE))
+        return false;
     if (every > 0)
         return st->since >= every;
     /* Before the first: a disk that writes 200 MB/s, and a twentieth of a second to make it safe. */
@@ -159,8 +161,10 @@ void rl_state_take(rl_sequence_state *st, rl_slot_state *slot)
     rl_error ignored = {0};
     st->saved_at = start;
     st->since = 0;
-    if (!take(st, &slot->saved, slot->chain, &ignored))
-        slot->saved_s = rl_state_now() - start;
+    if (take(st, &slot->saved, slot->chain, &ignored))
+        return;
+    slot->saved_s = rl_state_now() - start;
+    __atomic_store_n(&st->pending, true, __ATOMIC_RELEASE);
 }
 
 static rl_code store(rl_sequence_state *st, const rl_checkpoint *c, rl_error *err)
@@ -183,6 +187,8 @@ rl_code rl_state_store(rl_sequence_state *st, rl_slot_state *slot, rl_error *err
     double start = rl_state_now();
     rl_code code = store(st, &slot->saved, err);
     slot->saved_s += rl_state_now() - start;
+    rl_checkpoint_free(&slot->saved);
+    __atomic_store_n(&st->pending, false, __ATOMIC_RELEASE);
     /* Two stay: if the newest turns out to be damaged, there is one more. */
     while (!code && st->n_kept - st->n_pinned > 2) {
         remove_one(st, st->kept[st->n_pinned]);

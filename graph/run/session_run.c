@@ -254,19 +254,10 @@ static int batch_stop(void *ctx)
     return b->hooks && b->hooks->stop ? b->hooks->stop(b->hooks->ctx) : 0;
 }
 
-/* As many frames as overlap usefully and as the memory limit lets be in flight. */
-static int in_flight(const rl_session *s, const rl_sequence *q)
-{
-    int n = RL_MOST_IN_FLIGHT;
-    while (n > 1 && s->options.memory_limit && rl_plan_bytes(q->plan, &q->geometry, n) > s->options.memory_limit)
-        n--;
-    return n;
-}
-
 static rl_code run_frames(batch_state *b, bool *stopped, rl_error *err)
 {
     rl_batch batch = {.items = b->state.n_work,
-                      .in_flight = in_flight(b->s, b->q),
+                      .in_flight = rl_session_in_flight(b->s, b->q),
                       .load = batch_load,
                       .run = batch_run,
                       .write = batch_write,

@@ -308,10 +308,8 @@ void rl_state_written(rl_sequence_state *st, const rl_work *w, int slot, const r
     if (w->write)
         rl_ledger_write(st->ledger, f->number, failed ? RL_LEDGER_FAILED : RL_LEDGER_DONE, slot_state->chain,
                         &slot_state->inputs, &err);
-    if (!err.code)
-        rl_state_store(st, slot_state, &err);
+    rl_state_store(st, slot_state, &err);
     if (err.code)
         rl_report(st->session->log, RL_WARNING, (rl_where){.file = err.file},
                   "%s; the run goes on, but --resume will make some frames again", err.text);
-    rl_checkpoint_free(&slot_state->saved);
 }

@@ -16,8 +16,6 @@
 extern "C" {
 #endif
 
-enum { RL_MOST_IN_FLIGHT = 3 };
-
 /* What belongs to a frame in flight. */
 typedef struct rl_slot_state {
     rl_inputs inputs;
@@ -50,6 +48,7 @@ typedef struct rl_sequence_state {
     double saved_at;  /* s on the monotonic clock: when the last checkpoint was taken, or the run began */
     int since;        /* frames that ran since then */
     double cost_s;    /* of a checkpoint, all in all; 0: none was written yet */
+    bool pending; /* a checkpoint was taken and is not written yet: one at a time, it is large; atomic */
     /* the write stage's: frames of the checkpoints that this run has written and not removed, oldest first */
     int *kept;
     size_t n_kept, n_pinned; /* the first of them that stay, since a frame behind them failed */
