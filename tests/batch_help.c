@@ -40,7 +40,8 @@ static void make_loop(const batch_place *p, int frames)
     }
     snprintf(line, sizeof line, "frames: 1-%d\n", frames);
     char *named = text_replace(manifest, "monkey_turn.####.exr", "loop.####.exr");
-    char *begun = text_replace(named, "frames: 1-12\n", line), *whole = text_replace(begun, "name: monkey_turn", "name: loop");
+    char *begun = text_replace(named, "frames: 1-12\n", line),
+         *whole = text_replace(begun, "name: monkey_turn", "name: loop");
     file_write(p->capture, "capture.yaml", whole, strlen(whole));
     free(manifest);
     free(named);

@@ -1,5 +1,5 @@
-/* A run that was killed, stopped or robbed of files goes on with --resume, and the result is that of a run that nothing
- * happened to, byte for byte. */
+/* A run that was killed, stopped or robbed of files goes on with --resume, and the result is that of a run
+ * that nothing happened to, byte for byte. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -63,12 +63,14 @@ static uint32_t next_random(uint32_t *state)
     return *state = *state * 1664525u + 1013904223u;
 }
 
-/* ---- kill -9 --------------------------------------------------------------------------------------------- */
+/* ---- kill -9 ---------------------------------------------------------------------------------------------
+ */
 
 /* Starts a run and kills it after `seconds`; true when it had ended by itself before, well. */
 static bool run_and_kill(const char *out, double seconds)
 {
-    pid_t pid = batch_start(&place, out, (const char *const[]){"--resume", "--quiet", "--checkpoint-frames", "3", NULL});
+    pid_t pid = batch_start(&place, out,
+                            (const char *const[]){"--resume", "--quiet", "--checkpoint-frames", "3", NULL});
     struct timespec pause = {(time_t)seconds, (long)((seconds - (double)(time_t)seconds) * 1e9)};
     nanosleep(&pause, NULL);
     kill(pid, SIGKILL);
@@ -114,7 +116,8 @@ static void test_kill(void **state)
     }
 }
 
-/* ---- signals --------------------------------------------------------------------------------------------- */
+/* ---- signals ---------------------------------------------------------------------------------------------
+ */
 
 static void test_stop(void **state)
 {
@@ -138,7 +141,8 @@ static void test_stop(void **state)
             assert_int_equal(batch_notes(&place, out, ".checkpoint"), 1);
             tool_result r = BATCH(&place, out, 0, "--resume");
             assert_non_null(strstr(r.err, "going on from the checkpoint"));
-            assert_null(strstr(r.err, "for their history only")); /* it is of the last frame that was written */
+            assert_null(
+                strstr(r.err, "for their history only")); /* it is of the last frame that was written */
             tool_result_free(&r);
             batch_assert_same(&place, "plain", out);
             free(log);
@@ -149,7 +153,8 @@ static void test_stop(void **state)
     assert_true(stopped);
 }
 
-/* ---- what is there, what is missing ---------------------------------------------------------------------- */
+/* ---- what is there, what is missing ----------------------------------------------------------------------
+ */
 
 static void copy_of_plain(const char *out)
 {
@@ -201,7 +206,8 @@ static void test_no_history(void **state)
     assert_int_equal(count(r.out, "\"frame\""), 1);
     assert_null(strstr(r.err, "for their history only"));
     tool_result_free(&r);
-    assert_int_equal(batch_differences(&place, "plain", "flat"), FRAMES); /* another picture, but all of them */
+    assert_int_equal(batch_differences(&place, "plain", "flat"),
+                     FRAMES); /* another picture, but all of them */
 }
 
 /* Another pipeline's pictures, or of other inputs, do not count; a touched file is still the same. */
@@ -243,7 +249,8 @@ static void test_identity(void **state)
     free(data);
 }
 
-/* ---- checkpoints ----------------------------------------------------------------------------------------- */
+/* ---- checkpoints -----------------------------------------------------------------------------------------
+ */
 
 /* A run of the first frames that leaves its checkpoint: the first of two shards. */
 static char *leave_checkpoint(const char *out)

@@ -1,5 +1,5 @@
-/* Shards: which frames each takes, that with exact hand-over they equal one run, what they say when they cannot, and
- * that warm-up errs by no more than `relit plan` states. */
+/* Shards: which frames each takes, that with exact hand-over they equal one run, what they say when they
+ * cannot, and that warm-up errs by no more than `relit plan` states. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -37,21 +37,23 @@ static int teardown(void **state)
     return 0;
 }
 
-/* ---- numbers --------------------------------------------------------------------------------------------- */
+/* ---- numbers ---------------------------------------------------------------------------------------------
+ */
 
 static uint32_t next_random(uint32_t *state)
 {
     return (*state = *state * 1664525u + 1013904223u) >> 16;
 }
 
-/* Over random captures: parts cover all frames once, in order; none is empty while there are captures enough, and none
- * then cuts a capture in two. */
+/* Over random captures: parts cover all frames once, in order; none is empty while there are captures enough,
+ * and none then cuts a capture in two. */
 static void test_parts(void **state)
 {
     (void)state;
     uint32_t seed = 7;
     for (int trial = 0; trial < 2000; trial++) {
-        size_t ends[8], captures = 1 + next_random(&seed) % 8, sum = 0, n = 1 + next_random(&seed) % 10, at = 0;
+        size_t ends[8], captures = 1 + next_random(&seed) % 8, sum = 0, n = 1 + next_random(&seed) % 10,
+                        at = 0;
         for (size_t k = 0; k < captures; k++)
             ends[k] = sum += 1 + next_random(&seed) % 50;
         assert_int_equal(rl_shard_begin(0, n, ends, captures), 0);
@@ -119,7 +121,8 @@ static void test_schedule(void **state)
     }
 }
 
-/* ---- runs ------------------------------------------------------------------------------------------------ */
+/* ---- runs ------------------------------------------------------------------------------------------------
+ */
 
 static void shard(const char *out, const char *which, const char *more)
 {
@@ -178,8 +181,8 @@ static void test_several(void **state)
     tool_result r = BATCH(&place, "both", 0, "--quiet", "--capture", monkey, "--capture", place.capture);
     tool_result_free(&r);
     for (int i = 2; i > 0; i--) {
-        r = BATCH(&place, "halves", 0, "--json", "--shard", i == 2 ? "2/2" : "1/2", "--capture", monkey, "--capture",
-                  place.capture);
+        r = BATCH(&place, "halves", 0, "--json", "--shard", i == 2 ? "2/2" : "1/2", "--capture", monkey,
+                  "--capture", place.capture);
         assert_true(!strstr(r.out, "\"monkey\"") == (i == 2) && !strstr(r.out, "\"loop\"") == (i == 1));
         tool_result_free(&r);
     }
@@ -195,7 +198,8 @@ static void test_several(void **state)
     batch_assert_same(&place, "flat one", "flat");
 }
 
-/* ---- warm-up --------------------------------------------------------------------------------------------- */
+/* ---- warm-up ---------------------------------------------------------------------------------------------
+ */
 
 enum { WIDTH = 480, HEIGHT = 270, PIXELS = WIDTH * HEIGHT };
 
@@ -224,14 +228,15 @@ static void test_warm_up(void **state)
     (void)state;
     char monkey[PATH_MAX];
     assert_non_null(realpath("captures/monkey", monkey));
-#define STILL                                                                                                          \
-    "--quiet", "--capture", monkey, "--set", "graph.aa.clip_gamma=8", "--set", "graph.aa.blend=0.3", "--set",          \
-        "outputs.beauty.type=float", "--dump", "join.color"
+#define STILL                                                                                                \
+    "--quiet", "--capture", monkey, "--set", "graph.aa.clip_gamma=8", "--set", "graph.aa.blend=0.3",         \
+        "--set", "outputs.beauty.type=float", "--dump", "join.color"
     tool_result r = BATCH(&place, "exact", 0, STILL);
     tool_result_free(&r);
     r = BATCH(&place, "warm", 0, STILL, "--shard", "2/2", "--preroll", "2");
     tool_result_free(&r);
-    float *low = load("exact", "monkey.join.color.0001.exr"), *high = load("exact", "monkey.join.color.0001.exr");
+    float *low = load("exact", "monkey.join.color.0001.exr"),
+          *high = load("exact", "monkey.join.color.0001.exr");
     for (int i = 2; i <= 8; i++) {
         char name[64];
         snprintf(name, sizeof name, "monkey.join.color.%04d.exr", i);
@@ -253,7 +258,7 @@ static void test_warm_up(void **state)
             beyond += error > share * range + 1e-6;
             off += error > 0;
         }
-        assert_true(off > 1000); /* there is something to be bounded */
+        assert_true(off > 1000);                  /* there is something to be bounded */
         assert_true(beyond <= 3 * PIXELS / 1000); /* clipped all the same, or a firefly */
         free(a);
         free(b);
@@ -266,8 +271,8 @@ static void test_warm_up(void **state)
 static void test_plan(void **state)
 {
     (void)state;
-    tool_result r = tool_run((const char *const[]){"plan", place.pipe, "--capture", place.capture, "--shard", "2/3",
-                                                   "--json", NULL});
+    tool_result r = tool_run((const char *const[]){"plan", place.pipe, "--capture", place.capture, "--shard",
+                                                   "2/3", "--json", NULL});
     assert_int_equal(r.status, 0);
     json_t *root = json_loads(r.out, 0, NULL), *part = json_object_get(root, "shard");
     assert_int_equal(json_integer_value(json_object_get(part, "first")), 5);
@@ -276,16 +281,16 @@ static void test_plan(void **state)
     assert_true(json_is_true(json_object_get(part, "exact")));
     json_decref(root);
     tool_result_free(&r);
-    r = tool_run((const char *const[]){"plan", place.pipe, "--capture", place.capture, "--shard", "3/3", "--preroll", "3",
-                                       NULL});
+    r = tool_run((const char *const[]){"plan", place.pipe, "--capture", place.capture, "--shard", "3/3",
+                                       "--preroll", "3", NULL});
     assert_int_equal(r.status, 0);
     assert_non_null(strstr(r.out, "shard 3/3 of 'loop': writes 5 of 14 frames, 10 to 14"));
     assert_non_null(strstr(r.out, "processes the 3 frames before them"));
     assert_non_null(strstr(r.out, "(1 - w)^(K+1) = 81.5 %")); /* 0.95^4 */
     assert_non_null(strstr(r.out, "K = 58 gives 5 %, K = 89 gives 1 %"));
     tool_result_free(&r);
-    r = tool_run((const char *const[]){"plan", place.pipe, "--capture", place.capture, "--shard", "2/3", "--preroll", "9",
-                                       NULL});
+    r = tool_run((const char *const[]){"plan", place.pipe, "--capture", place.capture, "--shard", "2/3",
+                                       "--preroll", "9", NULL});
     assert_non_null(strstr(r.out, "exact: the pictures of one run")); /* back to the first frame */
     tool_result_free(&r);
 }

@@ -89,7 +89,8 @@ static void test_stages(void **state)
     static event events[4096];
     int n;
     char *path = path_in(place.folder, "t.json");
-    tool_result r = BATCH(&place, "out", 0, "--quiet", "--trace", path, "--set", "outputs.beauty.colorspace=ACEScg");
+    tool_result r =
+        BATCH(&place, "out", 0, "--quiet", "--trace", path, "--set", "outputs.beauty.colorspace=ACEScg");
     tool_result_free(&r);
     json_t *root = load(path, events, 4096, &n);
     for (int frame = 1; frame <= FRAMES; frame++) {
@@ -97,7 +98,8 @@ static void test_stages(void **state)
                     *write = find(events, n, "write", frame), *encode = find(events, n, "encode", frame),
                     *colour = find(events, n, "colour", frame);
         assert_true(read && run && write && encode && colour);
-        assert_true(read->lane == 1 && run->lane == 2 && colour->lane == 3 && write->lane == 4 && encode->lane == 4);
+        assert_true(read->lane == 1 && run->lane == 2 && colour->lane == 3 && write->lane == 4 &&
+                    encode->lane == 4);
         assert_true(read->end <= run->begin && run->end <= write->begin); /* a frame passes them in order */
         assert_true(inside(encode, write));
         assert_string_equal(encode->name, "beauty");
@@ -114,12 +116,14 @@ static void test_stages(void **state)
         for (int b = 0; b < a; b++)
             if (events[a].lane == events[b].lane)
                 assert_true(inside(&events[a], &events[b]) || inside(&events[b], &events[a]) ||
-                            events[a].begin >= events[b].end - 0.002 || events[b].begin >= events[a].end - 0.002);
+                            events[a].begin >= events[b].end - 0.002 ||
+                            events[b].begin >= events[a].end - 0.002);
     json_decref(root);
     free(path);
 }
 
-/* A run with a frame that fails leaves its trace too; one that cannot be written is an error, after the pictures. */
+/* A run with a frame that fails leaves its trace too; one that cannot be written is an error, after the
+ * pictures. */
 static void test_failures(void **state)
 {
     (void)state;

@@ -31,9 +31,12 @@ enum { ORDER = 0x01020304 };
 
 void rl_identity_difference(const rl_identity *a, const rl_identity *b, char *out, size_t size)
 {
-    static const char *const names[RL_ID_PARTS] = {
-        [RL_ID_VERSION] = "relit's version", [RL_ID_PIPELINE] = "the pipeline", [RL_ID_CAPTURE] = "the capture's manifest",
-        [RL_ID_PLAN] = "the plan",           [RL_ID_KERNELS] = "the kernels",   [RL_ID_DEVICE] = "the device"};
+    static const char *const names[RL_ID_PARTS] = {[RL_ID_VERSION] = "relit's version",
+                                                   [RL_ID_PIPELINE] = "the pipeline",
+                                                   [RL_ID_CAPTURE] = "the capture's manifest",
+                                                   [RL_ID_PLAN] = "the plan",
+                                                   [RL_ID_KERNELS] = "the kernels",
+                                                   [RL_ID_DEVICE] = "the device"};
     size_t used = 0, n = 0;
     *out = 0;
     for (int i = 0; i < RL_ID_PARTS && used < size; i++)
@@ -51,7 +54,8 @@ void rl_checkpoint_free(rl_checkpoint *c)
     *c = (rl_checkpoint){0};
 }
 
-/* ---- files ----------------------------------------------------------------------------------------------- */
+/* ---- files -----------------------------------------------------------------------------------------------
+ */
 
 static uint64_t check_of(const header *h)
 {
@@ -86,7 +90,8 @@ rl_code rl_checkpoint_write(const char *path, const rl_checkpoint *c, rl_error *
     FILE *f = fopen(temp, "wbxe");
     if (f)
         setvbuf(f, NULL, _IONBF, 0);
-    bool good = f && fwrite(&h, sizeof h, 1, f) == 1 && (!c->bytes || fwrite(c->history, c->bytes, 1, f) == 1);
+    bool good =
+        f && fwrite(&h, sizeof h, 1, f) == 1 && (!c->bytes || fwrite(c->history, c->bytes, 1, f) == 1);
     int why = errno;
     if (f && fclose(f) && good) {
         good = false;
@@ -116,7 +121,8 @@ static rl_code read_history(FILE *f, const char *path, const header *h, rl_check
     if (!out->history)
         return rl_fail_memory(err, h->bytes);
     out->bytes = h->bytes;
-    if ((h->bytes && fread(out->history, h->bytes, 1, f) != 1) || XXH3_64bits(out->history, h->bytes) != h->content)
+    if ((h->bytes && fread(out->history, h->bytes, 1, f) != 1) ||
+        XXH3_64bits(out->history, h->bytes) != h->content)
         return rl_fail_file(err, RL_E_FORMAT, path, "is damaged");
     return RL_OK;
 }
@@ -144,7 +150,8 @@ rl_code rl_checkpoint_read(const char *path, bool whole, rl_checkpoint *out, rl_
     return code;
 }
 
-/* ---- names ----------------------------------------------------------------------------------------------- */
+/* ---- names -----------------------------------------------------------------------------------------------
+ */
 
 char *rl_checkpoint_path(rl_arena *arena, const char *folder, const char *name, int frame)
 {
@@ -183,7 +190,8 @@ rl_code rl_checkpoint_list(rl_arena *arena, const char *folder, const char *name
     *n = 0;
     DIR *dir = opendir(folder);
     if (!dir)
-        return errno == ENOENT ? RL_OK : rl_fail_file(err, RL_E_IO, folder, "cannot be read: %s", strerror(errno));
+        return errno == ENOENT ? RL_OK
+                               : rl_fail_file(err, RL_E_IO, folder, "cannot be read: %s", strerror(errno));
     rl_code code = RL_OK;
     for (struct dirent *d = readdir(dir); d && !code; d = readdir(dir)) {
         int frame;

@@ -1,6 +1,6 @@
-/* Checkpoints: the state of a run between two frames of a sequence, as a file in OUT/.relit/. A file under its final
- * name is whole, and says exactly what it is the state of: one that was made by another pipeline, version, device or
- * from other inputs is refused. */
+/* Checkpoints: the state of a run between two frames of a sequence, as a file in OUT/.relit/. A file under
+ * its final name is whole, and says exactly what it is the state of: one that was made by another pipeline,
+ * version, device or from other inputs is refused. */
 #ifndef RL_RUN_CHECKPOINT_H
 #define RL_RUN_CHECKPOINT_H
 
@@ -18,8 +18,8 @@ typedef enum rl_identity_part {
     RL_ID_PIPELINE, /* merged content, user kernels' files, --only, --dump, --crop */
     RL_ID_CAPTURE,  /* the manifest without its paths and its list of frames */
     RL_ID_PLAN,
-    RL_ID_KERNELS,  /* their texts and tables: colour transforms are in there */
-    RL_ID_DEVICE,   /* its name, version and driver */
+    RL_ID_KERNELS, /* their texts and tables: colour transforms are in there */
+    RL_ID_DEVICE,  /* its name, version and driver */
     RL_ID_PARTS
 } rl_identity_part;
 
@@ -45,8 +45,8 @@ void rl_checkpoint_free(rl_checkpoint *checkpoint);
 /* Whole or not there, on the disk when it returns. */
 rl_code rl_checkpoint_write(const char *path, const rl_checkpoint *checkpoint, rl_error *err);
 
-/* The header alone (history NULL), or all of it, its hash checked. RL_E_FORMAT when it is no checkpoint of this
- * layout or is damaged. */
+/* The header alone (history NULL), or all of it, its hash checked. RL_E_FORMAT when it is no checkpoint of
+ * this layout or is damaged. */
 rl_code rl_checkpoint_read(const char *path, bool whole, rl_checkpoint *out, rl_error *err);
 
 /* "FOLDER/NAME.0012.checkpoint". */

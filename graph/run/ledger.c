@@ -26,13 +26,14 @@ struct rl_ledger {
 
 static const char suffix[] = ".ledger";
 
-/* ---- lines ----------------------------------------------------------------------------------------------- */
+/* ---- lines -----------------------------------------------------------------------------------------------
+ */
 
 /* "TIME KIND FRAME CHAIN STAT CONTENT CHECK": a line that was cut short does not check. */
 static int print_line(char *out, size_t size, int frame, const rl_ledger_line *e)
 {
     int n = snprintf(out, size, "%016" PRIx64 " %c %d %016" PRIx64 " %016" PRIx64 " %016" PRIx64, e->time,
-                     "-bdf"[e->kind], frame, e->chain, e->inputs.stat, e->inputs.content);
+                     "-bdf"[e->kind], frame, e -> chain, e -> inputs.stat, e->inputs.content);
     unsigned check = (unsigned)XXH3_64bits(out, (size_t)n);
     return n + snprintf(out + n, size - (size_t)n, " %08x\n", check);
 }
@@ -43,8 +44,8 @@ static bool parse_line(const char *line, size_t length, int *frame, rl_ledger_li
     unsigned check;
     *e = (rl_ledger_line){0};
     if (length < 10 || length > 200 ||
-        sscanf(line, "%" SCNx64 " %c %d %" SCNx64 " %" SCNx64 " %" SCNx64 " %x", &e->time, &kind, frame, &e->chain,
-               &e->inputs.stat, &e->inputs.content, &check) != 7)
+        sscanf(line, "%" SCNx64 " %c %d %" SCNx64 " %" SCNx64 " %" SCNx64 " %x", &e->time, &kind, frame,
+               &e->chain, &e->inputs.stat, &e->inputs.content, &check) != 7)
         return false;
     const char *at = strchr("-bdf", kind);
     e->kind = at ? (rl_ledger_kind)(at - "-bdf") : RL_LEDGER_NONE;
@@ -77,7 +78,8 @@ static rl_code read_file(rl_ledger *l, const char *path, rl_error *err)
     return code;
 }
 
-/* ---- the folder ------------------------------------------------------------------------------------------ */
+/* ---- the folder ------------------------------------------------------------------------------------------
+ */
 
 /* "NAME.ledger" and "NAME.TAG.ledger"; a tag has no dot, so that names that begin alike stay apart. */
 static bool is_ledger_of(const char *file, const char *name)
@@ -93,7 +95,8 @@ static rl_code read_folder(rl_ledger *l, const char *folder, const char *name, r
 {
     DIR *dir = opendir(folder);
     if (!dir)
-        return errno == ENOENT ? RL_OK : rl_fail_file(err, RL_E_IO, folder, "cannot be read: %s", strerror(errno));
+        return errno == ENOENT ? RL_OK
+                               : rl_fail_file(err, RL_E_IO, folder, "cannot be read: %s", strerror(errno));
     rl_code code = RL_OK;
     for (struct dirent *d = readdir(dir); d && !code; d = readdir(dir)) {
         if (!is_ledger_of(d->d_name, name))
@@ -170,14 +173,15 @@ rl_code rl_ledger_write(rl_ledger *l, int frame, rl_ledger_kind kind, uint64_t c
     if (l->fd < 0)
         l->fd = open(l->path, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
     int n = print_line(line, sizeof line, frame, e);
-    /* One call: a process that is killed leaves a whole line or none. A line that a full disk cut short does not
-     * check, and neither does the one that is appended to it: the frame is then made again. */
+    /* One call: a process that is killed leaves a whole line or none. A line that a full disk cut short does
+     * not check, and neither does the one that is appended to it: the frame is then made again. */
     if (l->fd < 0 || write(l->fd, line, (size_t)n) != n)
         return rl_fail_file(err, RL_E_IO, l->path, "cannot be written: %s", strerror(errno));
     return RL_OK;
 }
 
-/* ---- inputs ---------------------------------------------------------------------------------------------- */
+/* ---- inputs ----------------------------------------------------------------------------------------------
+ */
 
 /* Bytes of one file into a running hash. */
 static bool hash_file(XXH3_state_t *hash, const char *path, void *buffer, size_t room)

@@ -10,8 +10,8 @@ static const rl_layer *reads(const rl_reader *r, int pattern)
     return NULL;
 }
 
-rl_code rl_reader_paths(const rl_reader *r, int file_number, rl_arena *arena, const char *paths[RL_MOST_FILES],
-                        size_t *n, rl_error *err)
+rl_code rl_reader_paths(const rl_reader *r, int file_number, rl_arena *arena,
+                        const char *paths[RL_MOST_FILES], size_t *n, rl_error *err)
 {
     *n = 0;
     for (int p = 0; p < r->setup.manifest->n_patterns && p < RL_MOST_FILES; p++) {

@@ -39,8 +39,8 @@ size_t rl_shard_begin(size_t i, size_t n, const size_t *ends, size_t n_captures)
     size_t even = (size_t)((unsigned long long)total * i / n);
     if (n_captures < 2 || n > n_captures || i == 0 || i == n)
         return even;
-    /* Each boundary takes the capture's end nearest to the even one, behind the boundary before it and so that a capture
-     * is left for every part to come. */
+    /* Each boundary takes the capture's end nearest to the even one, behind the boundary before it and so
+     * that a capture is left for every part to come. */
     size_t at = 0;
     for (size_t b = 1, from = 0; b <= i; b++, from = at + 1) {
         even = (size_t)((unsigned long long)total * b / n);

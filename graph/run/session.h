@@ -78,10 +78,19 @@ void rl_session_light_values(const rl_sequence *sequence, const camera_t *camera
 rl_code rl_session_sequences(rl_session *session, rl_error *err);
 void rl_sequence_close(rl_sequence *sequence);
 
-/* session_run.c: runs the kernels on a loaded frame. `cut`: history does not reach here. `spans`: NULL, or plan->n_steps
+/* session_paths.c: no two outputs, captures or frames write one file. */
+rl_code rl_session_paths(rl_session *session, rl_error *err);
+
+/* session_run.c (batches of frames: session_batch.c): runs the kernels on a loaded frame. `cut`: history does not reach here. `spans`: NULL, or plan->n_steps
  * of them. */
 rl_code rl_session_execute(rl_session *session, rl_sequence *sequence, rl_frame *frame, bool cut, rl_span *spans,
                            rl_error *err);
+/* Buffers follow the size of the frame that they hold. */
+rl_code rl_session_fit_buffers(rl_sequence *sequence, rl_frame *frame, rl_error *err);
+/* Writes all outputs of a frame that ran; files[0…n_outputs-1] (may be NULL: memory was out) get the names of those that
+ * are whole. */
+rl_code rl_session_write_frame(rl_session *session, rl_sequence *sequence, rl_frame *frame, const rl_run_hooks *hooks,
+                               rl_arena *arena, const char **files, size_t *n_files, rl_error *err);
 /* Where the planes of a graph output's image are, mapped; unmap with the memory. */
 rl_code rl_session_map_image(const rl_sequence *sequence, const rl_frame *frame, int buffer, rl_sink_image *out,
                              rl_memory **memory, rl_error *err);

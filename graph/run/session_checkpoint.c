@@ -13,16 +13,19 @@ double rl_state_now(void)
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-/* ---- found ----------------------------------------------------------------------------------------------- */
+/* ---- found -----------------------------------------------------------------------------------------------
+ */
 
-static rl_code path_of(const rl_sequence_state *st, rl_arena *arena, int frame, const char **path, rl_error *err)
+static rl_code path_of(const rl_sequence_state *st, rl_arena *arena, int frame, const char **path,
+                       rl_error *err)
 {
     *path = rl_checkpoint_path(arena, st->folder, st->name, frame);
     return *path ? RL_OK : rl_fail_memory(err, 1);
 }
 
 /* Why a checkpoint is of no use here: "" when it is of use. */
-static void refusal(const rl_sequence_state *st, const rl_checkpoint *c, uint64_t chain, char *out, size_t size)
+static void refusal(const rl_sequence_state *st, const rl_checkpoint *c, uint64_t chain, char *out,
+                    size_t size)
 {
     rl_identity_difference(&c->identity, &st->identity, out, size);
     if (!*out && c->chain != chain)
@@ -41,14 +44,15 @@ static void judge(rl_sequence_state *st, int frame, uint64_t chain, bool *saved)
     if (err.code)
         rl_report(st->session->log, RL_NOTE, (rl_where){.file = err.file}, "%s; it is not used", err.text);
     else if (*why)
-        rl_report(st->session->log, RL_NOTE, (rl_where){.file = path}, "this checkpoint is not used: %s", why);
+        rl_report(st->session->log, RL_NOTE, (rl_where){.file = path}, "this checkpoint is not used: %s",
+                  why);
     *saved = !err.code && !*why;
     rl_checkpoint_free(&c);
     rl_arena_free(&arena);
 }
 
-rl_code rl_state_find_checkpoints(rl_sequence_state *st, size_t from, size_t to, const uint64_t *chains, bool *saved,
-                                  rl_error *err)
+rl_code rl_state_find_checkpoints(rl_sequence_state *st, size_t from, size_t to, const uint64_t *chains,
+                                  bool *saved, rl_error *err)
 {
     int *frames;
     size_t n;
@@ -92,7 +96,8 @@ void rl_state_drop_checkpoints(rl_sequence_state *st, const bool *saved)
     }
 }
 
-/* ---- loaded ---------------------------------------------------------------------------------------------- */
+/* ---- loaded ----------------------------------------------------------------------------------------------
+ */
 
 rl_code rl_state_load_checkpoint(const rl_sequence_state *st, int frame, rl_checkpoint *out, rl_error *err)
 {
@@ -111,13 +116,15 @@ rl_code rl_state_load_checkpoint(const rl_sequence_state *st, int frame, rl_chec
     return code;
 }
 
-rl_code rl_state_restore(rl_sequence_state *st, int frame, int *previous, camera_t *camera, rl_error *err)
+rl_code rl_state_restore(rl_sequence_state *st, int frame, bool *restored, int *previous, camera_t *camera,
+                         rl_error *err)
 {
     rl_checkpoint c = {0};
+    rl_executor *x = st->sequence->executor;
     rl_code code = rl_state_load_checkpoint(st, frame, &c, err);
-    if (!code)
-        code = rl_executor_history_load(st->sequence->executor, &c.geometry, c.history, c.bytes, &c.previous, err);
-    st->chained = !code;
+    if (!code && c.bytes)
+        code = rl_executor_history_load(x, &c.geometry, c.history, c.bytes, &c.previous, err);
+    *restored = st->chained = !code && c.bytes > 0;
     st->chain = c.chain;
     *previous = c.frame;
     *camera = c.previous;
@@ -125,7 +132,8 @@ rl_code rl_state_restore(rl_sequence_state *st, int frame, int *previous, camera
     return code;
 }
 
-/* ---- taken and stored ------------------------------------------------------------------------------------ */
+/* ---- taken and stored ------------------------------------------------------------------------------------
+ */
 
 bool rl_state_is_due(const rl_sequence_state *st)
 {
@@ -149,7 +157,8 @@ static rl_code take(rl_sequence_state *st, rl_checkpoint *c, uint64_t chain, rl_
                          .geometry = *rl_executor_geometry(x),
                          .bytes = rl_executor_history_bytes(x)};
     c->history = rl_malloc(c->bytes);
-    rl_code code = c->history ? rl_executor_history_save(x, c->history, &c->previous, err) : rl_fail_memory(err, c->bytes);
+    rl_code code = c->history ? rl_executor_history_save(x, c->history, &c->previous, err)
+                              : rl_fail_memory(err, c->bytes);
     if (code)
         rl_checkpoint_free(c);
     return code;
@@ -192,7 +201,8 @@ rl_code rl_state_store(rl_sequence_state *st, rl_slot_state *slot, rl_error *err
     /* Two stay: if the newest turns out to be damaged, there is one more. */
     while (!code && st->n_kept - st->n_pinned > 2) {
         remove_one(st, st->kept[st->n_pinned]);
-        memmove(&st->kept[st->n_pinned], &st->kept[st->n_pinned + 1], (st->n_kept - st->n_pinned - 1) * sizeof *st->kept);
+        memmove(&st->kept[st->n_pinned], &st->kept[st->n_pinned + 1],
+                (st->n_kept - st->n_pinned - 1) * sizeof *st->kept);
         st->n_kept--;
     }
     return code;
@@ -214,13 +224,18 @@ void rl_state_finish(rl_sequence_state *st, bool stopped)
 {
     rl_error err = {0};
     rl_checkpoint c = {0};
-    bool wanted = st->history && st->chained && (stopped || st->hands_over);
-    if (wanted && !stored_already(st) && !take(st, &c, st->chain, &err))
+    bool ran = st->history && st->n_work > 0 && !stored_already(st);
+    if (ran && st->chained && (stopped || st->hands_over) && !take(st, &c, st->chain, &err))
         store(st, &c, &err);
+    /* The next shard must not wait for history that a frame which failed or was held has ended. */
+    if (ran && !st->chained && !stopped && st->hands_over) {
+        c = (rl_checkpoint){.identity = st->identity, .chain = st->chain, .frame = st->last_frame};
+        store(st, &c, &err);
+    }
     rl_checkpoint_free(&c);
     if (err.code)
-        rl_report(st->session->log, RL_WARNING, (rl_where){.file = err.file}, "no checkpoint could be written: %s",
-                  err.text);
+        rl_report(st->session->log, RL_WARNING, (rl_where){.file = err.file},
+                  "no checkpoint could be written: %s", err.text);
     if (stopped || st->failed)
         return;
     int *frames;

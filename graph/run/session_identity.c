@@ -26,8 +26,8 @@ static uint64_t hash_pipeline(const rl_session *s)
     return add_bytes(h, o->crop, sizeof o->crop);
 }
 
-/* The manifest, whatever folder it lies in and however many frames it lists: the frames are in the chain, and a capture
- * that grew can be gone on with. */
+/* The manifest, whatever folder it lies in and however many frames it lists: the frames are in the chain, and
+ * a capture that grew can be gone on with. */
 static rl_code hash_capture(const rl_session *s, const rl_sequence *q, uint64_t *out, rl_error *err)
 {
     rl_arena arena = {0};
@@ -98,7 +98,8 @@ rl_code rl_session_identity(const rl_session *s, const rl_sequence *q, rl_identi
     *out = (rl_identity){0};
     out->part[RL_ID_VERSION] = add_text(0, RL_VERSION);
     out->part[RL_ID_PIPELINE] = hash_pipeline(s);
-    out->part[RL_ID_DEVICE] = add_text(add_text(add_text(add_text(0, d->name), d->platform), d->version), d->driver);
+    out->part[RL_ID_DEVICE] =
+        add_text(add_text(add_text(add_text(0, d->name), d->platform), d->version), d->driver);
     rl_code code = hash_capture(s, q, &out->part[RL_ID_CAPTURE], err);
     if (!code)
         code = hash_plan(q, &out->part[RL_ID_PLAN], err);

@@ -25,11 +25,12 @@ static int output_channels(const rl_sequence *q, size_t output)
     return n;
 }
 
-/* Coverage as a plane; then chunks of an EXR (coded, packed, and what waits to be written, a thread), or all samples of
- * an image in another format. Outputs are written one after the other. */
+/* Coverage as a plane; then chunks of an EXR (coded, packed, and what waits to be written, a thread), or all
+ * samples of an image in another format. Outputs are written one after the other. */
 static size_t encode_bytes(const rl_session *s, const rl_sequence *q)
 {
-    static const size_t type_bytes[] = {[RL_HALF] = 2, [RL_FLOAT] = 4, [RL_UINT8] = 1, [RL_UINT16] = 2, [RL_UINT32] = 4};
+    static const size_t type_bytes[] = {
+        [RL_HALF] = 2, [RL_FLOAT] = 4, [RL_UINT8] = 1, [RL_UINT16] = 2, [RL_UINT32] = 4};
     size_t pixels = (size_t)q->geometry.width * (size_t)q->geometry.height, most = 0;
     for (size_t i = 0; i < s->n_outputs; i++) {
         const rl_output *o = s->outputs[i].spec;
@@ -62,7 +63,8 @@ void rl_session_need(const rl_session *s, const rl_sequence *q, int in_flight, r
         return;
     size_t pixels = (size_t)q->geometry.width * (size_t)q->geometry.height;
     out->plan = rl_plan_bytes(q->plan, &q->geometry, in_flight);
-    out->decode = add((size_t)q->decode_bytes, keeps_ids(s) ? pixels * sizeof(uint32_t) * (size_t)in_flight : 0);
+    out->decode =
+        add((size_t)q->decode_bytes, keeps_ids(s) ? pixels * sizeof(uint32_t) * (size_t)in_flight : 0);
     out->encode = add(encode_bytes(s, q), FIXED + (size_t)s->threads * A_THREAD);
     for (size_t i = 0; i < q->plan->n_buffers; i++) /* one copy on its way to the disk */
         if (q->plan->buffers[i].kind == RL_BUFFER_HISTORY)
@@ -104,9 +106,10 @@ rl_code rl_session_check_memory(const rl_session *s, rl_error *err)
 static rl_code add_json(const rl_memory_need *n, int in_flight, rl_str *text, rl_error *err)
 {
     json_t *root = json_loads(rl_str_text(text), 0, NULL);
-    json_t *peak = json_pack("{s:i, s:I, s:I, s:I, s:I, s:I}", "in_flight", in_flight, "buffers", (json_int_t)n->plan,
-                             "reading", (json_int_t)n->decode, "writing", (json_int_t)n->encode, "checkpoint",
-                             (json_int_t)n->checkpoint, "total", (json_int_t)n->total);
+    json_t *peak =
+        json_pack("{s:i, s:I, s:I, s:I, s:I, s:I}", "in_flight", in_flight, "buffers", (json_int_t)n->plan,
+                  "reading", (json_int_t)n->decode, "writing", (json_int_t)n->encode, "checkpoint",
+                  (json_int_t)n->checkpoint, "total", (json_int_t)n->total);
     bool good = root && peak && !json_object_set_new(root, "peak", peak);
     char *whole = good ? json_dumps(root, JSON_COMPACT) : NULL;
     text->length = 0;
@@ -117,7 +120,8 @@ static rl_code add_json(const rl_memory_need *n, int in_flight, rl_str *text, rl
     return whole ? RL_OK : rl_fail_memory(err, 1);
 }
 
-rl_code rl_session_print_need(const rl_session *s, const rl_sequence *q, bool json, rl_str *text, rl_error *err)
+rl_code rl_session_print_need(const rl_session *s, const rl_sequence *q, bool json, rl_str *text,
+                              rl_error *err)
 {
     rl_memory_need n;
     char plan[32], decode[32], encode[32], checkpoint[32], total[32];
@@ -128,9 +132,10 @@ rl_code rl_session_print_need(const rl_session *s, const rl_sequence *q, bool js
     if (json)
         return add_json(&n, in_flight, text, err);
     rl_str_printf(text,
-                  "\npeak memory of a run with %d %s in flight\n  %s: buffers %s, reading %s, writing %s, a checkpoint %s\n",
+                  "\npeak memory of a run with %d %s in flight\n  %s: buffers %s, reading %s, writing %s, a "
+                  "checkpoint %s\n",
                   in_flight, in_flight == 1 ? "frame" : "frames", rl_format_bytes(n.total, total),
-                  rl_format_bytes(n.plan, plan), rl_format_bytes(n.decode, decode), rl_format_bytes(n.encode, encode),
-                  rl_format_bytes(n.checkpoint, checkpoint));
+                  rl_format_bytes(n.plan, plan), rl_format_bytes(n.decode, decode),
+                  rl_format_bytes(n.encode, encode), rl_format_bytes(n.checkpoint, checkpoint));
     return RL_OK;
 }

@@ -19,11 +19,12 @@ void rl_state_announce(const rl_sequence_state *st)
 rl_code rl_state_lacks(const rl_sequence_state *st, rl_error *err)
 {
     const int *shard = st->session->options.shard;
-    return rl_fail_file(err, RL_E_IO, st->folder,
-                        "'%s': shard %d/%d needs the checkpoint after frame %d, which shard %d/%d writes at its end; run "
-                        "it again when that is done, or give --preroll K for K frames of warm-up instead",
-                        st->sequence->manifest->name, shard[0], shard[1], st->sequence->frames.numbers[st->first - 1],
-                        shard[0] - 1, shard[1]);
+    return rl_fail_file(
+        err, RL_E_IO, st->folder,
+        "'%s': shard %d/%d needs the checkpoint after frame %d, which shard %d/%d writes at its end; run "
+        "it again when that is done, or give --preroll K for K frames of warm-up instead",
+        st->sequence->manifest->name, shard[0], shard[1], st->sequence->frames.numbers[st->first - 1],
+        shard[0] - 1, shard[1]);
 }
 
 void rl_session_stage(const rl_run_hooks *hooks, rl_lane lane, const rl_frame *f)
@@ -56,8 +57,8 @@ static const char *category(const rl_session *s, const rl_plan_step *step)
     return (size_t)step->node < s->pipeline->n_nodes ? "kernel" : "colour";
 }
 
-void rl_session_step_spans(const rl_run_hooks *hooks, const rl_session *s, const rl_sequence *q, const rl_frame *f,
-                           const rl_span *spans)
+void rl_session_step_spans(const rl_run_hooks *hooks, const rl_session *s, const rl_sequence *q,
+                           const rl_frame *f, const rl_span *spans)
 {
     for (size_t i = 0; spans && hooks && hooks->span && i < q->plan->n_steps; i++) {
         const rl_plan_step *step = &q->plan->steps[i];

@@ -16,7 +16,8 @@ bool rl_sequence_is_cut(const rl_sequence *q, size_t i)
     const rl_manifest *m = q->manifest;
     if (i == 0 || rl_frames_find(&m->cuts, q->frames.numbers[i]) >= 0)
         return true;
-    return rl_frames_find(&m->frames, q->frames.numbers[i]) != rl_frames_find(&m->frames, q->frames.numbers[i - 1]) + 1;
+    return rl_frames_find(&m->frames, q->frames.numbers[i]) !=
+           rl_frames_find(&m->frames, q->frames.numbers[i - 1]) + 1;
 }
 
 /* The index, over the frames of all captures, at which the i-th shard (from 0) begins. */

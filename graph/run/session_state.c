@@ -12,7 +12,8 @@
 #include "graph/run/leftovers.h"
 #include "graph/run/session_checkpoint.h"
 
-/* ---- chains ---------------------------------------------------------------------------------------------- */
+/* ---- chains ----------------------------------------------------------------------------------------------
+ */
 
 static uint64_t extend(uint64_t chain, int frame, uint64_t content)
 {
@@ -20,45 +21,57 @@ static uint64_t extend(uint64_t chain, int frame, uint64_t content)
     return XXH3_64bits(link, sizeof link);
 }
 
-static rl_inputs inputs_of(rl_sequence_state *st, size_t i, rl_error *err)
+static rl_inputs own_inputs(const rl_sequence_state *st, size_t i)
 {
     const rl_sequence *q = st->sequence;
-    const rl_frames *listed = &q->manifest->frames;
-    rl_inputs in = {.missing = true};
-    bool hold = st->session->options.on_missing == RL_MISSING_HOLD;
     rl_arena arena = {0};
-    /* A frame that is held is made of the files of the last one that is there. */
-    for (long k = rl_frames_find(listed, q->frames.numbers[i]); k >= 0 && in.missing; k--) {
-        const char *paths[RL_MOST_FILES];
-        size_t n;
-        if (rl_reader_paths(q->reader, listed->numbers[k], &arena, paths, &n, err))
-            break;
-        in = rl_ledger_inputs(st->ledger, listed->numbers[k], paths, n);
-        if (!hold)
-            break;
-    }
+    const char *paths[RL_MOST_FILES];
+    size_t n;
+    rl_inputs in = {.missing = true};
+    if (!rl_reader_paths(q->reader, q->frames.numbers[i], &arena, paths, &n, NULL))
+        in = rl_ledger_inputs(st->ledger, q->frames.numbers[i], paths, n);
     rl_arena_free(&arena);
     return in;
 }
 
+/* A held frame is made of its own broken files, if there are any, and of those of the frame that it holds. */
+static uint64_t held_content(const rl_inputs *own, const rl_inputs *source)
+{
+    uint64_t both[2] = {own->content, source->content};
+    return XXH3_64bits(both, sizeof both);
+}
+
+/* What frame i will be made of, for all that can be told without decoding. */
+static rl_inputs expected_inputs(const rl_sequence_state *st, size_t i)
+{
+    rl_inputs in = own_inputs(st, i);
+    if (!in.missing || st->session->options.on_missing != RL_MISSING_HOLD)
+        return in;
+    for (size_t k = i; k-- > 0;) {
+        rl_inputs source = own_inputs(st, k);
+        if (source.missing)
+            continue;
+        in.content = held_content(&in, &source);
+        break;
+    }
+    return in;
+}
+
 /* What the chains of frames from…to-1 will be if none of them fails; a missing frame ends history. */
-static rl_code expect_chains(rl_sequence_state *st, size_t from, size_t to, uint64_t *chains, bool *missing,
-                             rl_error *err)
+static void expect_chains(rl_sequence_state *st, size_t from, size_t to, uint64_t *chains, bool *missing)
 {
     uint64_t chain = st->root;
     for (size_t i = from; i < to; i++) {
-        rl_inputs in = inputs_of(st, i, err);
-        if (err->code)
-            return err->code;
+        rl_inputs in = expected_inputs(st, i);
         missing[i] = in.missing;
         st->cut[i] |= i > from && missing[i - 1];
         chain = extend(st->cut[i] ? st->root : chain, st->sequence->frames.numbers[i], in.content);
         chains[i] = chain;
     }
-    return RL_OK;
 }
 
-/* ---- what is there --------------------------------------------------------------------------------------- */
+/* ---- what is there ---------------------------------------------------------------------------------------
+ */
 
 static bool pictures_exist(rl_sequence_state *st, int frame)
 {
@@ -67,7 +80,8 @@ static bool pictures_exist(rl_sequence_state *st, int frame)
     bool all = true;
     for (size_t i = 0; i < s->n_outputs && all; i++) {
         const char *name, *path = NULL;
-        if (!rl_output_path(&arena, s->outputs[i].spec, st->sequence->manifest->name, frame, NULL, &name, NULL))
+        if (!rl_output_path(&arena, s->outputs[i].spec, st->sequence->manifest->name, frame, NULL, &name,
+                            NULL))
             path = rl_path_join(&arena, s->options.out ? s->options.out : "out", name);
         all = path && rl_path_exists(path);
     }
@@ -83,8 +97,8 @@ static void find_done(rl_sequence_state *st, const uint64_t *chains, const bool 
         int frame = st->sequence->frames.numbers[i];
         const rl_ledger_line *line = rl_ledger_find(st->ledger, frame);
         bool there = line->kind == RL_LEDGER_DONE && pictures_exist(st, frame);
-        if (missing[i])
-            needed[i] = st->session->options.on_missing != RL_MISSING_SKIP;
+        if (missing[i] && st->session->options.on_missing == RL_MISSING_SKIP)
+            needed[i] = false;
         else
             needed[i] = !there || line->chain != chains[i];
         others += there && line->chain != chains[i];
@@ -92,12 +106,14 @@ static void find_done(rl_sequence_state *st, const uint64_t *chains, const bool 
     }
     if (others)
         rl_report(st->session->log, RL_NOTE, RL_NOWHERE,
-                  "'%s': %zu frames are there, but made by another pipeline, version or device or from other inputs; they "
+                  "'%s': %zu frames are there, but made by another pipeline, version or device or from other "
+                  "inputs; they "
                   "are made again",
                   st->sequence->manifest->name, others);
 }
 
-/* ---- the work -------------------------------------------------------------------------------------------- */
+/* ---- the work --------------------------------------------------------------------------------------------
+ */
 
 /* Used checkpoints are read once in full: one that is damaged is as good as none. */
 static bool all_readable(rl_sequence_state *st, bool *saved)
@@ -110,7 +126,8 @@ static bool all_readable(rl_sequence_state *st, bool *saved)
         rl_checkpoint c = {0};
         rl_error err = {0};
         if (rl_state_load_checkpoint(st, st->sequence->frames.numbers[before], &c, &err)) {
-            rl_report(st->session->log, RL_WARNING, (rl_where){.file = err.file}, "%s; it is not used", err.text);
+            rl_report(st->session->log, RL_WARNING, (rl_where){.file = err.file}, "%s; it is not used",
+                      err.text);
             saved[before] = good = false;
         }
         rl_checkpoint_free(&c);
@@ -133,7 +150,8 @@ static void make_work(rl_sequence_state *st, const bool *needed, bool *saved)
         st->n_write += st->work[i].write;
 }
 
-/* Which frames have to be looked at: those of the run, and for a checkpoint's chain those since history began. */
+/* Which frames have to be looked at: those of the run, and for a checkpoint's chain those since history
+ * began. */
 static size_t history_begins(const rl_sequence_state *st)
 {
     size_t i = st->first;
@@ -155,7 +173,8 @@ static void clean_up(rl_sequence_state *st)
         n += paths[n] != NULL;
         for (size_t i = 0; i < s->n_outputs && st->work[w].write; i++) {
             const char *name;
-            if (rl_output_path(&arena, s->outputs[i].spec, st->sequence->manifest->name, frame, NULL, &name, NULL))
+            if (rl_output_path(&arena, s->outputs[i].spec, st->sequence->manifest->name, frame, NULL, &name,
+                               NULL))
                 continue;
             paths[n] = rl_path_join(&arena, s->options.out ? s->options.out : "out", name);
             n += paths[n] != NULL;
@@ -182,8 +201,8 @@ static rl_code decide(rl_sequence_state *st, rl_error *err)
         needed[i] = true;
     rl_code code = RL_OK;
     if (resume || begin < st->first)
-        code = expect_chains(st, begin, resume ? st->last : st->first, chains, missing, err);
-    if (!code && resume)
+        expect_chains(st, begin, resume ? st->last : st->first, chains, missing);
+    if (resume)
         find_done(st, chains, missing, needed);
     if (!code && st->history)
         code = rl_state_find_checkpoints(st, begin, resume ? st->last : st->first, chains, saved, err);
@@ -197,7 +216,8 @@ static rl_code decide(rl_sequence_state *st, rl_error *err)
     return RL_OK;
 }
 
-/* ---- beginning and end ----------------------------------------------------------------------------------- */
+/* ---- beginning and end -----------------------------------------------------------------------------------
+ */
 
 static void find_range(rl_sequence_state *st, size_t sequence)
 {
@@ -248,46 +268,44 @@ void rl_sequence_state_end(rl_sequence_state *st)
     *st = (rl_sequence_state){0};
 }
 
-/* ---- the stages ------------------------------------------------------------------------------------------ */
+/* ---- the stages ------------------------------------------------------------------------------------------
+ */
 
-void rl_state_loaded(rl_sequence_state *st, int slot, const rl_frame *f)
+void rl_state_loaded(rl_sequence_state *st, int slot, size_t index, size_t source)
 {
-    const char *paths[RL_MOST_FILES];
-    size_t n = 0;
-    for (int i = 0; i < RL_MOST_FILES; i++)
-        if (f->files[i])
-            paths[n++] = rl_exr_path(f->files[i]);
-    st->slots[slot].inputs = rl_ledger_inputs(st->ledger, f->number, paths, n);
+    rl_inputs *in = &st->slots[slot].inputs;
+    *in = own_inputs(st, index);
+    st->slots[slot].content = in->content;
+    if (source != index) {
+        rl_inputs other = own_inputs(st, source);
+        st->slots[slot].content = held_content(in, &other);
+    }
 }
 
-rl_code rl_state_ready(rl_sequence_state *st, const rl_work *w, int slot, int frame, bool *restored, int *previous,
-                       camera_t *camera, rl_error *err)
+void rl_state_ready(rl_sequence_state *st, const rl_work *w, int slot, bool *restored, int *previous,
+                    camera_t *camera, rl_error *err)
 {
     rl_slot_state *slot_state = &st->slots[slot];
-    rl_code code = RL_OK;
+    const int *numbers = st->sequence->frames.numbers;
     *restored = false;
     if (slot_state->saved_s > 0) /* the last one that came out of this slot */
         st->cost_s = slot_state->saved_s;
     slot_state->saved_s = 0;
-    if (w->start == RL_START_CHECKPOINT) {
-        code = rl_state_restore(st, st->sequence->frames.numbers[w->frame - 1], previous, camera, err);
-        *restored = !code;
-    }
+    if (w->start == RL_START_CHECKPOINT)
+        rl_state_restore(st, numbers[w->frame - 1], restored, previous, camera, err);
     bool alone = !st->chained || st->cut[w->frame];
-    slot_state->chain = extend(alone ? st->root : st->chain, frame, slot_state->inputs.content);
-    return code;
+    slot_state->chain = extend(alone ? st->root : st->chain, numbers[w->frame], slot_state->content);
 }
 
-void rl_state_ran(rl_sequence_state *st, const rl_work *w, int slot, const rl_frame *f, bool good)
+void rl_state_ran(rl_sequence_state *st, int slot, const rl_frame *f, bool keeps)
 {
     rl_slot_state *slot_state = &st->slots[slot];
-    st->chained = good;
+    st->chained = keeps;
     st->chain = slot_state->chain;
     st->last_frame = f->number;
     st->since++;
-    if (good && st->history && rl_state_is_due(st))
+    if (keeps && st->history && rl_state_is_due(st))
         rl_state_take(st, slot_state);
-    (void)w;
 }
 
 rl_code rl_state_writing(rl_sequence_state *st, int slot, int frame, rl_error *err)

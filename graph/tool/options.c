@@ -54,9 +54,10 @@ static const option options[] = {
              "may be repeated"},
     {"crop", "X,Y,W,H", SHARED, REGION, AT(run.crop),
      .help = "a region, in pixels of the display window"},
-    {"on-missing", "WORD", SHARED, WORD, AT(on_missing), .words = "error|skip",
-     .help = "what to do about an input frame that is missing:\n"
-             "error (default), or skip it"},
+    {"on-missing", "WORD", SHARED, WORD, AT(on_missing), .words = "error|skip|hold",
+     .help = "what to do about an input frame that is missing\n"
+             "or broken: error (default), skip it, or hold the\n"
+             "frame before it under its number"},
     {"resume", NULL, RL_CMD_RUN, FLAG, AT(run.resume),
      .help = "keep the pictures that are there and whole, and go\n"
              "on from the last checkpoint of their history"},

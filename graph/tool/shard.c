@@ -25,13 +25,15 @@ static void print_fading(const rl_fading *f, size_t k, rl_str *out)
                                      : "with these parameters history never has to fade: no bound\n");
         return;
     }
-    rl_str_printf(out,
-                  "a frame has at least the share w = %g in its result; what lies before the warm-up at most\n"
-                  "    (1 - w)^(K+1) = %.3g %% in the first picture, times 1 - w in each picture behind it. A colour is off\n"
-                  "    by at most that share of the range which it had over the frames that history holds,\n"
-                  "    %s.\n    K = %.0f gives 5 %%, K = %.0f gives 1 %%\n",
-                  f->least, 100 * share(f->least, k), f->where ? f->where : "everywhere", needed(f->least, 0.05),
-                  needed(f->least, 0.01));
+    rl_str_printf(
+        out,
+        "a frame has at least the share w = %g in its result; what lies before the warm-up at most\n"
+        "    (1 - w)^(K+1) = %.3g %% in the first picture, times 1 - w in each picture behind it. A colour "
+        "is off\n"
+        "    by at most that share of the range which it had over the frames that history holds,\n"
+        "    %s.\n    K = %.0f gives 5 %%, K = %.0f gives 1 %%\n",
+        f->least, 100 * share(f->least, k), f->where ? f->where : "everywhere", needed(f->least, 0.05),
+        needed(f->least, 0.01));
 }
 
 void rl_shard_print(const rl_session *s, size_t capture, const rl_options *o, rl_str *out)
@@ -39,20 +41,22 @@ void rl_shard_print(const rl_session *s, size_t capture, const rl_options *o, rl
     rl_shard_part p;
     rl_fading f;
     rl_session_shard(s, capture, &p);
-    rl_str_printf(out, "\nshard %d/%d of '%s': ", o->shard[0], o->shard[1], rl_session_capture_name(s, capture));
+    rl_str_printf(out, "\nshard %d/%d of '%s': ", o->shard[0], o->shard[1],
+                  rl_session_capture_name(s, capture));
     if (!p.n) {
         rl_str_add(out, "no frames\n");
         return;
     }
-    rl_str_printf(out, "writes %zu of %zu frames, %lld to %lld\n", p.n, rl_session_frames(s, capture), p.first, p.last);
+    rl_str_printf(out, "writes %zu of %zu frames, %lld to %lld\n", p.n, rl_session_frames(s, capture),
+                  p.first, p.last);
     if (p.takes_over)
-        rl_str_printf(out, "  goes on from the checkpoint after frame %lld, which shard %d/%d writes\n", p.from,
-                      o->shard[0] - 1, o->shard[1]);
+        rl_str_printf(out, "  goes on from the checkpoint after frame %lld, which shard %d/%d writes\n",
+                      p.from, o->shard[0] - 1, o->shard[1]);
     if (p.preroll)
         rl_str_printf(out, "  processes the %zu frames before them for their history only\n", p.preroll);
     if (p.hands_over)
-        rl_str_printf(out, "  leaves a checkpoint after frame %lld for shard %d/%d\n", p.last, o->shard[0] + 1,
-                      o->shard[1]);
+        rl_str_printf(out, "  leaves a checkpoint after frame %lld for shard %d/%d\n", p.last,
+                      o->shard[0] + 1, o->shard[1]);
     if (p.exact) {
         rl_str_printf(out, "  exact: the pictures of one run over all frames, bit for bit%s\n",
                       p.history ? "" : " (the graph keeps no history)");
@@ -62,7 +66,8 @@ void rl_shard_print(const rl_session *s, size_t capture, const rl_options *o, rl
     for (size_t i = 0; rl_session_fading(s, capture, i, &f); i++)
         print_fading(&f, p.preroll, out);
     if (rl_session_fading(s, capture, 1, &f))
-        rl_str_add(out, "  each is about a node whose inputs are exact: errors of one that feeds another add to its own\n");
+        rl_str_add(out, "  each is about a node whose inputs are exact: errors of one that feeds another add "
+                        "to its own\n");
 }
 
 static json_t *fading_json(const rl_session *s, size_t capture, const rl_shard_part *p)
@@ -70,9 +75,10 @@ static json_t *fading_json(const rl_session *s, size_t capture, const rl_shard_p
     json_t *list = json_array();
     rl_fading f;
     for (size_t i = 0; !p->exact && rl_session_fading(s, capture, i, &f); i++)
-        json_array_append_new(list, json_pack("{s:s, s:s, s:o, s:o}", "node", f.node, "pass", f.pass, "least_share",
-                                              f.least >= 0 ? json_real(f.least) : json_null(), "bound",
-                                              f.least > 0 ? json_real(share(f.least, p->preroll)) : json_null()));
+        json_array_append_new(list,
+                              json_pack("{s:s, s:s, s:o, s:o}", "node", f.node, "pass", f.pass, "least_share",
+                                        f.least >= 0 ? json_real(f.least) : json_null(), "bound",
+                                        f.least > 0 ? json_real(share(f.least, p->preroll)) : json_null()));
     return list;
 }
 
@@ -82,9 +88,10 @@ rl_code rl_shard_json(const rl_session *s, size_t capture, const rl_options *o, 
     rl_shard_part p;
     json_t *root = json_loads(text, 0, NULL);
     rl_session_shard(s, capture, &p);
-    json_t *shard = json_pack("{s:i, s:i, s:I, s:I, s:b, s:b, s:o}", "part", o->shard[0], "parts", o->shard[1], "frames",
-                              (json_int_t)p.n, "preroll", (json_int_t)p.preroll, "exact", p.exact, "hands_over",
-                              p.hands_over, "fading", fading_json(s, capture, &p));
+    json_t *shard =
+        json_pack("{s:i, s:i, s:I, s:I, s:b, s:b, s:o}", "part", o->shard[0], "parts", o->shard[1], "frames",
+                  (json_int_t)p.n, "preroll", (json_int_t)p.preroll, "exact", p.exact, "hands_over",
+                  p.hands_over, "fading", fading_json(s, capture, &p));
     if (p.n) {
         json_object_set_new(shard, "first", json_integer(p.first));
         json_object_set_new(shard, "last", json_integer(p.last));

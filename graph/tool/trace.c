@@ -107,10 +107,12 @@ static void add_time(rl_str *s, const char *key, uint64_t ns)
 static void add_lanes(rl_str *s)
 {
     static const char *const names[RL_LANES] = {"1 read", "2 run", "3 device", "4 write"};
-    rl_str_add(s, "{\"ph\":\"M\",\"pid\":1,\"name\":\"process_name\",\"args\":{\"name\":\"relit " RL_VERSION "\"}}");
+    rl_str_add(s, "{\"ph\":\"M\",\"pid\":1,\"name\":\"process_name\",\"args\":{\"name\":\"relit " RL_VERSION
+                  "\"}}");
     for (int i = 0; i < RL_LANES; i++)
-        rl_str_printf(s, ",\n{\"ph\":\"M\",\"pid\":1,\"tid\":%d,\"name\":\"thread_name\",\"args\":{\"name\":\"%s\"}}",
-                      i + 1, names[i]);
+        rl_str_printf(
+            s, ",\n{\"ph\":\"M\",\"pid\":1,\"tid\":%d,\"name\":\"thread_name\",\"args\":{\"name\":\"%s\"}}",
+            i + 1, names[i]);
 }
 
 rl_code rl_trace_write(rl_trace *t, const char *path, rl_error *err)
@@ -120,7 +122,8 @@ rl_code rl_trace_write(rl_trace *t, const char *path, rl_error *err)
     pthread_mutex_lock(&t->mutex);
     for (size_t i = 0; i < t->n; i++)
         zero = t->spans[i].start < zero ? t->spans[i].start : zero;
-    rl_str_printf(&s, "{\"displayTimeUnit\":\"ms\",\"otherData\":{\"lost\":%zu},\"traceEvents\":[\n", t->lost);
+    rl_str_printf(&s, "{\"displayTimeUnit\":\"ms\",\"otherData\":{\"lost\":%zu},\"traceEvents\":[\n",
+                  t->lost);
     add_lanes(&s);
     for (size_t i = 0; i < t->n; i++) {
         const rl_run_span *e = &t->spans[i];
@@ -136,7 +139,8 @@ rl_code rl_trace_write(rl_trace *t, const char *path, rl_error *err)
     }
     rl_str_add(&s, "\n]}\n");
     pthread_mutex_unlock(&t->mutex);
-    rl_code code = s.failed ? rl_fail_memory(err, s.length) : rl_file_write(path, rl_str_text(&s), s.length, err);
+    rl_code code =
+        s.failed ? rl_fail_memory(err, s.length) : rl_file_write(path, rl_str_text(&s), s.length, err);
     rl_str_free(&s);
     return code;
 }
