@@ -144,11 +144,12 @@ typedef struct rl_run_span {
 
 typedef struct rl_run_hooks {
     void (*frame)(void *ctx, const rl_frame_result *result); /* in order of completion, one at a time */
-    void (*stage)(void *ctx, rl_lane lane, long long frame);    /* begins to read, run or write it; any thread; may be NULL */
-    void (*span)(void *ctx, const rl_run_span *span);           /* any thread, several at a time; may be NULL */
     int (*stop)(void *ctx); /* asked before each frame: nonzero finishes the frames in flight and returns
                                RL_E_CANCELLED */
     void *ctx;
+    /* What happens meanwhile; may be NULL. Any thread; span several at a time. */
+    void (*stage)(void *ctx, rl_lane lane, long long frame); /* begins to read, run or write a frame */
+    void (*span)(void *ctx, const rl_run_span *span);        /* has ended */
 } rl_run_hooks;
 
 typedef struct rl_run_summary {

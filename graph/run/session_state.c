@@ -233,6 +233,19 @@ static void find_range(rl_sequence_state *st, size_t sequence)
         st->cut[part.first] = true;
 }
 
+/* Pictures come first: a run that needs nothing of what others left goes on without. */
+static rl_code make_folder(const rl_sequence_state *st, rl_error *err)
+{
+    const rl_options *o = &st->session->options;
+    rl_error why = {0};
+    if (o->resume || o->shard[1])
+        return rl_folder_make(st->folder, err);
+    if (!rl_folder_make(st->folder, &why))
+        return RL_OK;
+    rl_report(st->session->log, RL_WARNING, (rl_where){.file = why.file}, "%s; --resume will not find this run", why.text);
+    return RL_OK;
+}
+
 rl_code rl_sequence_state_begin(rl_sequence_state *st, rl_session *s, size_t sequence, rl_error *err)
 {
     rl_sequence *q = &s->sequences[sequence];
@@ -247,7 +260,7 @@ rl_code rl_sequence_state_begin(rl_sequence_state *st, rl_session *s, size_t seq
     find_range(st, sequence);
     if (s->options.shard[1])
         snprintf(tag, sizeof tag, "%d-of-%d", s->options.shard[0], s->options.shard[1]);
-    rl_code code = rl_folder_make(st->folder, err);
+    rl_code code = make_folder(st, err);
     if (!code)
         code = rl_session_identity(s, q, &st->identity, err);
     st->root = XXH3_64bits(&st->identity, sizeof st->identity);
