@@ -182,6 +182,10 @@ typedef struct rl_pass {
     /* Computes constant tables from parameters and materials, in double, into `arena`; NULL = none. Pure. */
     rl_code (*tables)(const rl_pass_input *in, rl_arena *arena, rl_tables *out, rl_error *err);
     const void *data; /* for .tables of a pass that is built at run time; the engine does not look at it */
+    /* Passes with HISTORY ports: the least share that a frame has in its own result, so that the share of what is k
+     * frames old is at most (1 - it)^k; NULL = not known. `fades_where`: where that holds, and what holds elsewhere. */
+    double (*least_share)(const void *params);
+    const char *fades_where;
 } rl_pass;
 
 /* The struct holds the table's 4-byte fields and nothing else; RGB rows count three. */
