@@ -47,7 +47,7 @@ LIB_O   := $(LIB_C:%.c=$(BUILD)/%.o) $(LIB_CXX:%.cc=$(BUILD)/%.o) $(BUILD)/kerne
 TOOL_O  := $(TOOL_C:%.c=$(BUILD)/%.o)
 MAIN_O  := $(BUILD)/graph/tool/relit.o
 TESTS   := $(patsubst tests/%.c,$(BUILD)/tests/%,$(wildcard tests/test_*.c))
-HELP_O  := $(patsubst tests/%.c,$(BUILD)/tests/%.o,$(filter-out tests/test_%.c tests/bench_%.c tests/example.c,$(wildcard tests/*.c)))
+HELP_O  := $(patsubst tests/%.c,$(BUILD)/tests/%.o,$(filter-out tests/test_%.c tests/bench_%.c tests/example.c tests/temporal.c,$(wildcard tests/*.c)))
 
 all: $(BUILD)/relit $(BUILD)/librelit.a $(BUILD)/librelit.so $(BUILD)/relit_oiio.so
 

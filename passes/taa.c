@@ -29,7 +29,7 @@ static const rl_port ports[] = {
     {"last_stencil", RL_HISTORY, RL_ID, .of = "stencil", .help = "the previous materials", .optional = true},
     {"last_count", RL_HISTORY, RL_SCALAR, .of = "count", .help = "frames in the previous result"},
     {"color", RL_WRITE, RL_RGB, .help = "anti-aliased, scene-linear"},
-    {"count", RL_WRITE, RL_SCALAR, .help = "frames that the pixel consists of, this one included"},
+    {"count", RL_WRITE, RL_SCALAR, .help = "frames that the pixel consists of, this one included; negative where it follows an edge before it"},
 };
 
 static const rl_step steps[] = {{"taa", .domain = RL_EVERY_VECTOR}};
@@ -39,6 +39,7 @@ const rl_pass rl_pass_taa = {
     .help = "temporal anti-aliasing with variance clipping",
     .source = "Salvi 2016; Karis 2014; Yang et al. 2020",
     .kernel = "taa.cl",
+    .kernel_prelude = "temporal.cl",
     .params = RL_ARRAY(params),
     .params_size = sizeof(taa_params),
     .ports = RL_ARRAY(ports),
