@@ -31,11 +31,11 @@ double rl_burley_inverse(double xi)
     return -3 * log1p(-q);
 }
 
-void rl_burley_taps(size_t n, float *x, float *y, float *weight)
+void rl_burley_taps(size_t n, double offset, float *x, float *y, float *weight)
 {
     const double golden = pi * (3 - sqrt(5.0)); /* radians from tap to tap */
     for (size_t i = 0; i < n; i++) {
-        double r = rl_burley_inverse(RL_BURLEY_REACH * ((double)i + 0.5) / (double)n);
+        double r = rl_burley_inverse(RL_BURLEY_REACH * ((double)i + offset) / (double)n);
         x[i] = (float)(r * cos((double)i * golden));
         y[i] = (float)(r * sin((double)i * golden));
         weight[i] = (float)(r / (exp(-r) + exp(-r / 3)));
@@ -43,10 +43,9 @@ void rl_burley_taps(size_t n, float *x, float *y, float *weight)
 }
 
 const rl_param rl_scatter_profile_rows[RL_SCATTER_PROFILE_ROWS] = {
-    RL_ROW_SCATTER_DISTANCE,
+    RL_ROW_SCATTER_DISTANCE(.required = true),
     RL_ROW_TEXTURING,
-    M_ENUM(border, "renormalize|occlude", 0,
-           "samples of other materials and outside of the image: not counted, or black"),
+    RL_ROW_BORDER,
 };
 
 const rl_param rl_scatter_shading_rows[RL_SCATTER_SHADING_ROWS] = {

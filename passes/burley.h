@@ -32,8 +32,9 @@ double rl_burley_cdf(double r, double d);
 double rl_burley_inverse(double xi);
 
 /* n taps on the golden spiral, importance-sampled, in units of d: tap i lies at (x[i], y[i]), its radius has
- * CDF 0.997 (i + 1/2)/n, and weight[i] is 1/density, up to a factor that is the same for all taps. */
-void rl_burley_taps(size_t n, float *x, float *y, float *weight);
+ * CDF 0.997 (i + offset)/n, 0 < offset < 1, and weight[i] is 1/density, up to a factor that is the same for
+ * all taps. With ½ each tap is in the middle of its share; other offsets fill the gaps between those. */
+void rl_burley_taps(size_t n, double offset, float *x, float *y, float *weight);
 
 /* The rows that the passes share; identical rows in several passes are one field of the material table. */
 #define RL_SCATTER_PROFILE_ROWS 3

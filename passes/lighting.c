@@ -6,7 +6,7 @@
 #include "passes/shading_rows.h"
 
 static const rl_param profile_keys[] = {
-    RL_ROW_SCATTER_DISTANCE,
+    RL_ROW_SCATTER_DISTANCE(.required_with = "transmission=thin|thick"),
     RL_ROW_TEXTURING,
     M_ENUM(transmission, "none|thin|thick|beer_lambert", 0, "light that comes through from the back face",
            .source = "Golubev 2018; Helix"),

@@ -20,9 +20,9 @@ static const rl_param params[] = {
     P_ENUM(sss_burley_params, weighting, "area|plain", 0,
            "what a sample stands for: the surface that its pixel sees, or its pixel alone",
            .structural = true),
-    P_ENUM(sss_burley_params, rotation, "none|phase", 1,
-           "turn the pattern: never, or for each of 4x4 pixels and each frame"),
-    P(sss_burley_params, RL_I32, seed, 0, 2147483647, 0, "", "another choice of turns"),
+    P_ENUM(sss_burley_params, rotation, "none|white|ign|blue", 3,
+           "how the pattern changes from pixel to pixel and from frame to frame; blue: neighbours complement each other"),
+    P(sss_burley_params, RL_I32, seed, 0, 2147483647, 0, "", "another choice of patterns"),
 };
 RL_PARAMS_MATCH(sss_burley_params, 5);
 
@@ -44,20 +44,34 @@ static const rl_step steps[] = {
     {"sss_burley_resolve", .domain = RL_EVERY_VECTOR},
 };
 
-/* As kernels/sss_burley.cl reads it: 256 directions (cos, sin), then one pattern, or with `auto` those of 21
- * and of 55 taps; a pattern is its x, y and weights, each padded to a multiple of 64. */
-enum { TURNS = 256, TAP_BLOCK = 64 };
+/* As kernels/sss_burley.cl reads it: 256 directions (cos, sin), then the patterns for `taps`, or with `auto`
+ * those for 21 and those for 55. There are up to 15 for a number of taps, an odd number of them, their radii
+ * offset by (j + 1/2)/patterns: the one in the middle by a half. A pattern is its x, y and weights, each
+ * padded to a multiple of 64. */
+enum { TURNS = 256, TAP_BLOCK = 64, MOST_PATTERNS = 15, PATTERN_TAPS = 4096 };
+
+static size_t tap_stride(size_t taps)
+{
+    return (taps + TAP_BLOCK - 1) / TAP_BLOCK * TAP_BLOCK;
+}
+
+/* The more taps, the less the patterns differ: all together never exceed 4096 taps, 48 KiB. */
+static size_t pattern_count(size_t taps)
+{
+    size_t fit = PATTERN_TAPS / tap_stride(taps);
+    return fit > MOST_PATTERNS ? MOST_PATTERNS : (fit - 1) | 1;
+}
 
 static rl_code tables(const rl_pass_input *in, rl_arena *arena, rl_tables *out, rl_error *err)
 {
     const sss_burley_params *p = in->params;
-    size_t patterns[2] = {21, 55}, count = 2, n = 2 * TURNS;
+    size_t taps[2] = {21, 55}, count = 2, n = 2 * TURNS;
     if (p->taps > 0) {
-        patterns[0] = (size_t)p->taps;
+        taps[0] = (size_t)p->taps;
         count = 1;
     }
     for (size_t i = 0; i < count; i++)
-        n += 3 * ((patterns[i] + TAP_BLOCK - 1) / TAP_BLOCK * TAP_BLOCK);
+        n += 3 * tap_stride(taps[i]) * pattern_count(taps[i]);
     out->n = n;
     out->data = rl_arena_array(arena, n, sizeof *out->data);
     if (!out->data)
@@ -69,9 +83,9 @@ static rl_code tables(const rl_pass_input *in, rl_arena *arena, rl_tables *out, 
         *to++ = (float)sin(angle);
     }
     for (size_t i = 0; i < count; i++) {
-        size_t stride = (patterns[i] + TAP_BLOCK - 1) / TAP_BLOCK * TAP_BLOCK;
-        rl_burley_taps(patterns[i], to, to + stride, to + 2 * stride);
-        to += 3 * stride;
+        size_t stride = tap_stride(taps[i]), patterns = pattern_count(taps[i]);
+        for (size_t j = 0; j < patterns; j++, to += 3 * stride)
+            rl_burley_taps(taps[i], ((double)j + 0.5) / (double)patterns, to, to + stride, to + 2 * stride);
     }
     return RL_OK;
 }

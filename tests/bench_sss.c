@@ -112,7 +112,7 @@ static double run_ours(cl_session *session, const scene *s, int taps, int repeat
 {
     const struct {
         int32_t taps, orientation, weighting, rotation, seed;
-    } params = {taps, 0, 1, 1, 0};
+    } params = {taps, 0, 1, 3, 0};
     const cl_image images[] = {
         {"diffuse", s->diffuse, NULL },
         {"lit",     s->lit,     NULL },
@@ -149,7 +149,7 @@ static double run_talk(cl_session *session, const scene *s, int taps, int repeat
     float x[MOST], y[MOST], weight[MOST], table[3 * MOST];
     peer_material peers[3] = {0};
     float to_world[12];
-    rl_burley_taps((size_t)taps, x, y, weight);
+    rl_burley_taps((size_t)taps, 0.5, x, y, weight);
     for (int i = 0; i < taps; i++) {
         table[3 * i] = x[i];
         table[3 * i + 1] = y[i];

@@ -41,6 +41,7 @@ sss_scene sss_scene_make(int x, int y, int width, int height, float focal)
     s.depth = sss_planes(s.n);
     s.stencil = (uint32_t *)sss_planes(s.n);
     s.twin.materials = sss_materials;
+    s.twin.rotation = TWIN_BLUE;
     s.twin.diffuse = s.diffuse;
     s.twin.lit = s.lit;
     s.twin.albedo = s.albedo;
@@ -133,7 +134,7 @@ void sss_run(sss_scene *s, const rl_pass *pass, const void *params, cl_session *
 
 void sss_run_burley(sss_scene *s, int taps, int weighting)
 {
-    const sss_burley_params p = {taps, s->twin.tangent, weighting, 1, 7};
+    const sss_burley_params p = {taps, s->twin.tangent, weighting, s->twin.rotation, 7};
     sss_run(s, &rl_pass_sss_burley, &p, sss_session);
 }
 
@@ -157,7 +158,7 @@ double sss_worst(sss_scene *s, int taps, int weighting, int step)
             continue;
         if (sss_materials[s->stencil[i]].has_profile) {
             if (taps)
-                twin_burley(&s->twin, x, y, taps, true, 7, filtered);
+                twin_burley(&s->twin, x, y, taps, 7, filtered);
             else
                 twin_reference(&s->twin, x, y, filtered);
         }

@@ -50,7 +50,7 @@ void sss_scene_random(sss_scene *s, uint32_t seed);
 /* A plane parallel to the screen, one material, `light` everywhere. */
 void sss_scene_flat(sss_scene *s, uint32_t id, float depth, float light);
 
-/* Fill s->color and s->filtered. `orientation` is the scene's. */
+/* Fill s->color and s->filtered. `orientation` and `rotation` are the scene's. */
 void sss_run(sss_scene *s, const rl_pass *pass, const void *params, cl_session *on);
 void sss_run_burley(sss_scene *s, int taps, int weighting);
 void sss_run_reference(sss_scene *s, int weighting);

@@ -212,9 +212,9 @@ static float group_of(const twin_scene *s, int x, int y, float slopes[2])
     }
 }
 
-static uint32_t hash(uint32_t a)
+static uint32_t hash(uint32_t a, uint32_t b, uint32_t c, uint32_t d)
 {
-    uint32_t h = a * 0x9E3779B1u;
+    uint32_t h = a * 0x9E3779B1u ^ b * 0x85EBCA77u ^ c * 0xC2B2AE3Du ^ d * 0x27D4EB2Fu;
     h ^= h >> 15;
     h *= 0x2C1B3C6Du;
     h ^= h >> 12;
@@ -222,18 +222,43 @@ static uint32_t hash(uint32_t a)
     return h ^ (h >> 15);
 }
 
-static int turn_of(const twin_scene *s, int x, int y, int seed)
+static double fraction(double x)
 {
-    static const int order[4][4] = {
-        {0,  8,  2,  10},
-        {12, 4,  14, 6 },
-        {3,  11, 1,  9 },
-        {15, 7,  13, 5 }
-    };
-    return (order[y & 3][x & 3] * 16 + s->frame.number * 97 + (int)(hash((uint32_t)seed) >> 24)) & 255;
+    return x - floor(x);
 }
 
-void twin_burley(const twin_scene *s, int x, int y, int n, bool turn, int seed, double filtered[3])
+/* The pattern of a pixel: its turn and the offset of its radii, 0 to 1. */
+static void choice_of(const twin_scene *s, int x, int y, int seed, double choice[2])
+{
+    static const int order[4][4] = {{2, 3, 12, 6}, {14, 8, 4, 10}, {1, 11, 0, 5}, {15, 7, 13, 9}};
+    int number = s->frame.number, px = x & 3, py = y & 3;
+    double shift[2] = {ldexp(hash((uint32_t)seed, 0, 0, 1), -32), ldexp(hash((uint32_t)seed, 0, 0, 2), -32)};
+    for (int i = 0; i < 2; i++) {
+        if (s->rotation == TWIN_WHITE) {
+            uint32_t h = hash((uint32_t)seed, (uint32_t)number, (uint32_t)(4 * py + px), (uint32_t)i + 1);
+            choice[i] = ldexp(h, -32);
+        } else if (s->rotation == TWIN_IGN) {
+            double u = (i ? py : px) + 5.588238 * number, v = (i ? px : py) + 5.588238 * number;
+            choice[i] = fraction(52.9829189 * fraction(0.06711056 * u + 0.00583715 * v) + shift[i]);
+        } else if (s->rotation == TWIN_BLUE) {
+            const double g = 1.32471795724474602596;
+            choice[i] = fraction((number + 16.0 * order[py][px]) * (i ? 1 / g : 1 / (g * g)) + shift[i]);
+        } else {
+            choice[i] = i ? 0.5 : 0;
+        }
+    }
+}
+
+/* An odd number, at most 15, of patterns that are padded to 64 taps and have 4096 together. */
+static int patterns_of(int n)
+{
+    int most = 4096 / ((n + 63) / 64 * 64);
+    if (most > 15)
+        most = 15;
+    return most % 2 ? most : most - 1;
+}
+
+void twin_burley(const twin_scene *s, int x, int y, int n, int seed, double filtered[3])
 {
     const camera_t *c = &s->frame.camera;
     uint32_t id = s->stencil[at(s, x, y)];
@@ -244,12 +269,15 @@ void twin_burley(const twin_scene *s, int x, int y, int n, bool turn, int seed, 
     float less = slope2 > 0 ? (1.0f / sqrtf(1.0f + slope2) - 1.0f) / slope2 : 0;
     float xx = less * t[0] * t[0], xy = less * t[0] * t[1], yy = less * t[1] * t[1];
     float kx = c->focal[0] / (middle * inv_d), ky = c->focal[1] / (middle * inv_d);
-    int which = turn ? turn_of(s, x, y, seed) : 0;
-    float co = (float)cos(2 * pi * which / 256), si = (float)sin(2 * pi * which / 256);
+    double choice[2], offset;
+    choice_of(s, x, y, seed, choice);
+    offset = (floor(choice[1] * patterns_of(n)) + 0.5) / patterns_of(n);
+    float co = (float)cos(2 * pi * floor(choice[0] * 256) / 256),
+          si = (float)sin(2 * pi * floor(choice[0] * 256) / 256);
     double z = s->depth[at(s, x, y)], scale = z / middle, own = area_of(s, x, y), sum[3] = {0},
            weights[3] = {0};
     float *tx = rl_malloc((size_t)n * 12), *ty = tx + n, *tw = ty + n;
-    rl_burley_taps((size_t)n, tx, ty, tw);
+    rl_burley_taps((size_t)n, offset, tx, ty, tw);
     for (int i = 0; i < n; i++) {
         float u = fmaf(tx[i], co, -(ty[i] * si)), v = fmaf(tx[i], si, ty[i] * co);
         float x_disk = u;

@@ -24,7 +24,9 @@ typedef struct twin_scene {
     const uint32_t *stencil;
     bool area;    /* weighting: area */
     bool tangent; /* orientation: tangent */
+    int rotation; /* of sss_burley */
 } twin_scene;
+enum { TWIN_STILL = 0, TWIN_WHITE = 1, TWIN_IGN = 2, TWIN_BLUE = 3 };
 
 /* lit + filtered · exit · F_out at pixel (x, y), from the filtered radiance. */
 void twin_resolve(const twin_scene *s, int x, int y, const double filtered[3], double color[3]);
@@ -32,8 +34,7 @@ void twin_resolve(const twin_scene *s, int x, int y, const double filtered[3], d
 /* The dense sum. */
 void twin_reference(const twin_scene *s, int x, int y, double filtered[3]);
 
-/* n taps (n > 0), the vector's common scale and the phase's turn as the kernel has them; `turn`: rotation on.
- */
-void twin_burley(const twin_scene *s, int x, int y, int n, bool turn, int seed, double filtered[3]);
+/* n taps (n > 0), the vector's common scale and the phase's pattern as the kernel has them. */
+void twin_burley(const twin_scene *s, int x, int y, int n, int seed, double filtered[3]);
 
 #endif

@@ -110,7 +110,7 @@ static void taps_follow_profile(void **state)
     (void)state;
     enum { N = 1000 };
     static float x[N], y[N], w[N];
-    rl_burley_taps(N, x, y, w);
+    rl_burley_taps(N, 0.5, x, y, w);
     double mean_x = 0, mean_y = 0;
     for (int i = 0; i < N; i++) {
         double r = hypot(x[i], y[i]);

@@ -300,8 +300,8 @@ static bool same_row(const rl_param *a, const rl_param *b)
 {
     return a->type == b->type && a->min == b->min && a->max == b->max &&
            !memcmp(a->def, b->def, sizeof a->def) && same_text(a->words, b->words) &&
-           same_text(a->unit, b->unit) && same_text(a->help, b->help) && a->required == b->required &&
-           a->no_default == b->no_default;
+           same_text(a->unit, b->unit) && same_text(a->help, b->help) && a->no_default == b->no_default &&
+           a->most_sum == b->most_sum && a->list.rows == b->list.rows && a->list.n == b->list.n;
 }
 
 static rl_params group_of(const rl_pass *pass, const char *group)
@@ -311,7 +311,7 @@ static rl_params group_of(const rl_pass *pass, const char *group)
                                         : pass->shading_keys;
 }
 
-/* A key means one thing, whichever pass reads it; `profile` and `stencil` are the resolver's. */
+/* A key means one thing, whichever pass reads it and needs it; `profile` and `stencil` are the resolver's. */
 static void test_registered_rows(void **state)
 {
     (void)state;

@@ -161,7 +161,7 @@ static void bits_do_not_depend_on_threads(void **state)
     sss_scene_random(&s, 5);
     size_t bytes = 3 * s.n * sizeof(float);
     float *first = sss_planes(3 * s.n);
-    sss_burley_params p = {AUTO, TANGENT, AREA, 1, 0};
+    sss_burley_params p = {AUTO, TANGENT, AREA, TWIN_BLUE, 0};
     sss_run(&s, &rl_pass_sss_burley, &p, sss_session);
     memcpy(first, s.color, bytes);
     sss_run(&s, &rl_pass_sss_burley, &p, one);
@@ -175,7 +175,7 @@ static void bits_do_not_depend_on_threads(void **state)
     s.twin.frame.number++;
     sss_run(&s, &rl_pass_sss_burley, &p, sss_session);
     assert_memory_not_equal(first, s.color, bytes);
-    p.rotation = 0;
+    p.rotation = TWIN_STILL;
     sss_run(&s, &rl_pass_sss_burley, &p, sss_session);
     memcpy(first, s.color, bytes);
     s.twin.frame.number++;
@@ -235,11 +235,16 @@ static void tables_are_made(void **state)
     sss_burley_params p = {.taps = 100};
     rl_pass_input in = {.params = &p};
     assert_int_equal(rl_pass_sss_burley.tables(&in, &arena, &tables, &err), RL_OK);
-    assert_int_equal(tables.n, 512 + 3 * 128);
+    assert_int_equal(tables.n, 512 + 15 * 3 * 128);
     assert_true(fabsf(hypotf(tables.data[100], tables.data[101]) - 1) < 1e-6f);
     p.taps = AUTO;
     assert_int_equal(rl_pass_sss_burley.tables(&in, &arena, &tables, &err), RL_OK);
-    assert_int_equal(tables.n, 512 + 3 * 64 + 3 * 64);
+    assert_int_equal(tables.n, 512 + 15 * 3 * (64 + 64));
+    for (p.taps = 1; p.taps <= 4096; p.taps++) { /* constant memory has 64 KiB at least */
+        assert_int_equal(rl_pass_sss_burley.tables(&in, &arena, &tables, &err), RL_OK);
+        assert_true(tables.n * sizeof(float) <= 51200);
+        rl_arena_free(&arena);
+    }
     rl_arena_free(&arena);
     rl_alloc_fail_at(1, 1);
     assert_int_equal(rl_pass_sss_burley.tables(&in, &arena, &tables, &err), RL_E_MEMORY);

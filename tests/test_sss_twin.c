@@ -36,6 +36,8 @@ static void burley_equals_twin(void **state)
             s.twin.tangent = variant >> 1;
             sss_scene_random(&s, (uint32_t)k + 1);
             for (size_t t = 0; t < 4; t++) {
+                s.twin.rotation = (int)(t + k) % 4;
+                s.twin.frame.number = (int)k * 37 - 40;
                 sss_run_burley(&s, taps[t], weighting);
                 double worst = sss_worst(&s, taps[t], weighting, 2);
                 if (worst > 5e-5)

@@ -53,7 +53,8 @@ typedef struct rl_graph {
 
 /* An output that the graph must make: `layers[i]` names an image; `convert[i]` (may be NULL) is a pass with
  * one READ and one WRITE port, such as a colour transform, that is put between that image and the output as a
- * node of its own, "output.NAME" or, with several layers, "output.NAME.LAYER". */
+ * node of its own, "output.NAME" or, with several layers, "output.NAME.LAYER". An image of another format than
+ * that port's stays as it is beside others in one file (data is not colour), and is an error on its own. */
 typedef struct rl_wanted {
     const char *name;
     rl_where where;

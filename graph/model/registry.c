@@ -7,6 +7,7 @@
 #define RL_PASSES(X)                                                                                         \
     X(lighting)                                                                                              \
     X(sss_burley)                                                                                            \
+    X(sss_gaussian)                                                                                          \
     X(sss_reference)                                                                                         \
     X(combine)                                                                                               \
     X(geometric_normal)                                                                                      \

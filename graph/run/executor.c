@@ -33,6 +33,7 @@ struct rl_executor {
 };
 
 struct rl_frame_buffers {
+    rl_geometry geometry;
     rl_memory **memory; /* [n] */
     size_t n;
 };
@@ -221,6 +222,7 @@ rl_code rl_frame_buffers_new(rl_executor *x, const rl_geometry *geometry, rl_fra
     *out = f;
     if (!f)
         return rl_fail_memory(err, sizeof *f);
+    f->geometry = *geometry;
     f->n = x->plan->n_buffers;
     f->memory = rl_calloc(f->n + 1, sizeof *f->memory);
     rl_code code = f->memory ? RL_OK : rl_fail_memory(err, f->n * sizeof *f->memory);
@@ -244,6 +246,11 @@ void rl_frame_buffers_free(rl_frame_buffers **buffers)
         rl_memory_free(&f->memory[i]);
     rl_free(f->memory);
     rl_free(f);
+}
+
+const rl_geometry *rl_frame_buffers_geometry(const rl_frame_buffers *buffers)
+{
+    return &buffers->geometry;
 }
 
 rl_memory *rl_frame_buffers_memory(const rl_frame_buffers *buffers, int buffer)

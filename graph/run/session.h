@@ -77,6 +77,9 @@ void rl_session_light_values(const rl_sequence *sequence, const camera_t *camera
 rl_code rl_session_sequences(rl_session *session, rl_error *err);
 void rl_sequence_close(rl_sequence *sequence);
 
+/* session_paths.c: no two outputs, captures or frames write one file. */
+rl_code rl_session_paths(rl_session *session, rl_error *err);
+
 /* session_run.c: runs the kernels on a loaded frame. `cut`: history does not reach here. */
 rl_code rl_session_execute(rl_session *session, rl_sequence *sequence, rl_frame *frame, bool cut, rl_error *err);
 /* Where the planes of a graph output's image are, mapped; unmap with the memory. */

@@ -63,6 +63,8 @@ static rl_code find_preset(rl_session *s, const char *files, const char *presets
 
 static rl_code load_manifest(rl_session *s, const char *path, rl_sequence *q, rl_error *err)
 {
+    if (!path)
+        return rl_fail_memory(err, 1);
     const char *presets = rl_data_path(&s->arena, "presets");
     if (rl_path_is_folder(path) || is_yaml(path))
         return rl_manifest_load(&s->arena, path, presets, s->log, &q->manifest, err);
@@ -71,14 +73,14 @@ static rl_code load_manifest(rl_session *s, const char *path, rl_sequence *q, rl
     return code ? code : rl_manifest_bare(&s->arena, path, preset, presets, s->log, &q->manifest, err);
 }
 
-/* Chooses among a preset's alternatives by what the first frame's files hold. */
-static rl_code bind_manifest(rl_session *s, rl_sequence *q, rl_error *err)
+/* Chooses among a preset's alternatives by what one frame's files hold. */
+static rl_code bind_frame(rl_session *s, rl_sequence *q, int frame, rl_error *err)
 {
     rl_manifest *m = q->manifest;
     rl_code code = RL_OK;
-    for (int p = 0; p < m->n_patterns && m->preset && !code; p++) {
+    for (int p = 0; p < m->n_patterns && !code; p++) {
         const rl_layer fake = {.pattern = p};
-        char *path = rl_manifest_path(&s->arena, m, &fake, q->frames.numbers[0]);
+        char *path = rl_manifest_path(&s->arena, m, &fake, frame);
         rl_exr *file = NULL;
         rl_channel *channels = NULL;
         size_t n = 0;
@@ -90,6 +92,25 @@ static rl_code bind_manifest(rl_session *s, rl_sequence *q, rl_error *err)
         rl_exr_close(&file);
     }
     return code;
+}
+
+/* By the first frame whose files are there: a frame that is missing is that frame's own error later on. */
+static rl_code bind_manifest(rl_session *s, rl_sequence *q, rl_error *err)
+{
+    rl_error first = {0};
+    if (!q->manifest->preset)
+        return RL_OK;
+    for (size_t i = 0; i < q->frames.n; i++) {
+        rl_error one = {0};
+        rl_code code = bind_frame(s, q, q->frames.numbers[i], &one);
+        if (!rl_reader_missed(code)) {
+            *err = code ? one : *err;
+            return code;
+        }
+        first = first.code ? first : one;
+    }
+    *err = first;
+    return first.code;
 }
 
 static rl_code choose_frames(rl_session *s, rl_sequence *q, rl_error *err)
@@ -164,6 +185,26 @@ static bool wants_ids(const rl_session *s)
     return false;
 }
 
+/* The size of the first frame that can be opened; when none can, the error of the first. */
+static rl_code measure(rl_sequence *q, rl_error *err)
+{
+    rl_error first = {0};
+    for (size_t i = 0; i < q->frames.n; i++) {
+        rl_frame f = {.number = q->frames.numbers[i]};
+        rl_error one = {0};
+        rl_code code = rl_reader_open(q->reader, f.number, &f, &one);
+        q->geometry = f.geometry;
+        rl_frame_free(&f);
+        if (!rl_reader_missed(code)) {
+            *err = code ? one : *err;
+            return code;
+        }
+        first = first.code ? first : one;
+    }
+    *err = first;
+    return first.code;
+}
+
 static rl_code make_reader(rl_session *s, rl_sequence *q, rl_error *err)
 {
     rl_reader_setup setup = {.manifest = q->manifest,
@@ -177,13 +218,7 @@ static rl_code make_reader(rl_session *s, rl_sequence *q, rl_error *err)
                              .limit = s->options.memory_limit,
                              .log = s->log};
     rl_code code = rl_reader_new(&setup, &q->reader, err);
-    if (code || q->manifest->n_patterns == 0)
-        return code;
-    rl_frame first = {.number = q->frames.numbers[0]};
-    code = rl_reader_open(q->reader, q->frames.numbers[0], &first, err);
-    q->geometry = first.geometry;
-    rl_frame_free(&first);
-    return code;
+    return code || q->manifest->n_patterns == 0 ? code : measure(q, err);
 }
 
 static rl_code open_sequence(rl_session *s, rl_sequence *q, rl_error *err)
