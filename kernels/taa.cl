@@ -90,28 +90,44 @@ typedef struct history_t {
     global const uint *stencil;
 } history_t;
 
-/* Lanes whose surface is among those of the 3x3 history pixels around the place: the same material, and a depth between
- * the least and the largest that it has there. Bracketing makes slopes and jitter agree, but not another surface. Where
- * a pixel is alone now, no edge goes through it, and the nearest history pixel must have been of its surface, too. */
-static inline intv same_surface(constant frame_t *f, const history_t *h, uintv id, const place_t *p, int x, int y,
+/* Lanes whose nearest history pixel is of their surface. */
+static inline intv nearest_same(constant frame_t *f, const history_t *h, uintv id, floatv z, int x, int y, intv right,
+                                intv below, int whole)
+{
+    intv same = 0;
+    for (int i = 0; i < (whole ? 1 : 4); i++) {
+        intv nearest = (i & 1 ? right : ~right) & (i & 2 ? below : ~below);
+#if HAS_stencil
+        nearest &= rl_load_id_edge(h->stencil, f, x + (i & 1), y + (i >> 1)) == id;
+#endif
+        floatv t = far_if_empty(tap(h->depth, f, x + (i & 1), y + (i >> 1)));
+        same |= nearest & (fabs(t - z) <= 2 * DEPTH_TOLERANCE * z);
+    }
+    return same;
+}
+
+/* Lanes of `mask` whose surface was at the place. Where a pixel is alone now no edge goes through it, and the nearest
+ * history pixel must be of its surface. Elsewhere that is a matter of jitter: the surface must be among those of the 3x3
+ * history pixels, of the same material and at a depth between the least and the largest that it has there. */
+static inline intv same_surface(constant frame_t *f, const history_t *h, uintv id, const place_t *p, intv mask, int x, int y,
                                 intv right, intv below, int whole)
 {
     floatv low = 2 * FAR, high = 0.0f, z = p->then;
-    intv agrees = ~p->alone;
+    intv same = p->alone & nearest_same(f, h, id, z, x, y, right, below, whole);
+    if (!rl_any(mask & ~p->alone))
+        return same;
     for (int j = -1; j < 3 - whole; j++) {
         for (int i = -1; i < 3 - whole; i++) {
             intv use = (i == -1 ? ~right : i == 2 ? right : (intv)-1) & (j == -1 ? ~below : j == 2 ? below : (intv)-1);
-            intv nearest = (i == 0 ? ~right : i == 1 ? right : (intv)0) & (j == 0 ? ~below : j == 1 ? below : (intv)0);
 #if HAS_stencil
             use &= rl_load_id_edge(h->stencil, f, x + i, y + j) == id;
 #endif
             floatv t = far_if_empty(tap(h->depth, f, x + i, y + j));
             low = rl_select(low, fmin(low, t), use);
             high = rl_select(high, fmax(high, t), use);
-            agrees |= use & nearest & (fabs(t - z) <= 2 * DEPTH_TOLERANCE * z);
         }
     }
-    return agrees & (z >= low * (1.0f - DEPTH_TOLERANCE)) & (z <= high * (1.0f + DEPTH_TOLERANCE));
+    return same | (~p->alone & (z >= low * (1.0f - DEPTH_TOLERANCE)) & (z <= high * (1.0f + DEPTH_TOLERANCE)));
 }
 
 /* The count is negative where a pixel followed the edge of another surface: what is there is not of its own surface's past,
@@ -124,6 +140,16 @@ static inline floatv nearest_count(constant frame_t *f, const history_t *h, int 
     n = rl_select(n, tap(h->count, f, x + 1, y), right & ~below);
     n = rl_select(n, tap(h->count, f, x, y + 1), below & ~right);
     return rl_select(n, tap(h->count, f, x + 1, y + 1), below & right);
+}
+
+/* Lanes whose material is in the set. */
+static inline intv in_set(constant int *set, uintv id)
+{
+    intv in = 0;
+    for (int i = 0; i < 8; i++)
+        if (set[i])
+            in |= (id >> 5 == (uint)i) & ((((uintv)(uint)set[i] >> (id & 31u)) & 1u) != 0u);
+    return in;
 }
 
 /* Lanes whose displacement leads into the image, and its whole part as one word that is never 0. */
@@ -160,13 +186,13 @@ kernel void taa(global const float *color, global const float *depth, global con
         colour_box(&box, f, color, own, x, y, rl_select(p->clip_gamma, STILL * p->clip_gamma, still));
         floatv tx = dx - floor(dx), ty = dy - floor(dy);
         intv right = tx > 0.5f, below = ty > 0.5f;
-        uintv key = displacement_key(f, x, y, dx, dy);
+        uintv key = displacement_key(f, x, y, dx, dy) & ~rl_as_uintv(in_set(p->exclude, id));
         for (uint now = rl_max_id(key); now; now = rl_max_id(key)) {
             intv mask = key == now;
             key = select(key, (uintv)0, mask);
             int hx = x + (int)(now >> 16) - 32768, hy = y + (int)(now & 65535) - 32768;
             int whole = !rl_any(mask & ((tx != 0.0f) | (ty != 0.0f)));
-            mask &= same_surface(f, &h, id, &place, hx, hy, right, below, whole);
+            mask &= same_surface(f, &h, id, &place, mask, hx, hy, right, below, whole);
             floatv past[3], n = nearest_count(f, &h, hx, hy, right, below, whole);
             mask &= ~((n < 0.0f) & (place.alone | (place.behind & ~place.follows)));
             if (!rl_any(mask))

@@ -8,6 +8,7 @@
 typedef struct taa_params {
     float blend;
     float clip_gamma;
+    uint32_t exclude[RL_SET_WORDS];
 } taa_params;
 
 static const rl_param params[] = {
@@ -15,14 +16,16 @@ static const rl_param params[] = {
     P(taa_params, RL_F32, clip_gamma, 0, 8, 1, "stddev",
       "half width of the colour box that the history is clipped to; doubled where nothing moves",
       .source = "Salvi 2016"),
+    P_MATERIALS(taa_params, exclude, "what is not accumulated: always the current frame"),
 };
-RL_PARAMS_MATCH(taa_params, 2);
+RL_PARAMS_MATCH(taa_params, 2 + RL_SET_WORDS);
 
 static const rl_port ports[] = {
     {"color", RL_READ, RL_RGB, .help = "this frame, scene-linear"},
     {"depth", RL_READ, RL_SCALAR, .help = "planar, metres"},
     {"motion", RL_READ, RL_VEC2, .help = "pixels to the same point one frame before; else depth and cameras",
-     .optional = true},
+     .optional = true,
+     .if_absent = "motion comes from depth and the cameras, which do not know of what moves by itself"},
     {"stencil", RL_READ, RL_ID, .help = "material, to reject history of another", .optional = true},
     {"last_color", RL_HISTORY, RL_RGB, .of = "color", .help = "the previous result"},
     {"last_depth", RL_HISTORY, RL_SCALAR, .of = "depth", .help = "the previous depth"},

@@ -137,6 +137,8 @@ static void agrees_with_twin(void **state)
             t.run.images[TAA_MOTION] = NULL;
         if (i & 8)
             t.run.images[TAA_STENCIL] = t.run.images[TAA_LAST_STENCIL] = NULL;
+        if (i == 4)
+            t.params.exclude[0] = 1u << 2;
         if (i < 16)
             shade_camera(&f->previous, (double[]){0.104, 0.203, 1.01}, 0.302, -0.199);
         t.run.lanes = i % 4 == 2 ? 8 : i % 4 == 3 ? 4 : 16;
@@ -193,7 +195,7 @@ static double still_sequence(taa_case *t, double gamma)
     double *mean = calloc((size_t)f->plane * 3, sizeof *mean), error = 0, peak = 0;
     uint64_t seed = 5;
     assert_non_null(mean);
-    t->params = (twin_taa_params){0, (float)gamma};
+    t->params = (twin_taa_params){.clip_gamma = (float)gamma};
     t->run.frame.history = 0;
     for (int n = 0; n < 8; n++) {
         t->run.frame.camera.jitter[0] = (float)n / 8 - 0.4375f;
@@ -259,7 +261,7 @@ static void whole_pixels_move_exactly(void **state)
     make_still(&t, 77, 31);
     const frame_t *f = &t.run.frame;
     t.run.images[TAA_MOTION] = &t.images[TAA_MOTION];
-    t.params = (twin_taa_params){0.05f, 8};
+    t.params = (twin_taa_params){.blend = 0.05f, .clip_gamma = 8};
     for (int y = f->valid[1]; y < f->valid[3]; y++) {
         for (int x = f->valid[0]; x < f->valid[2]; x++) {
             *at(&t, TAA_MOTION, 0, x, y) =

@@ -142,22 +142,22 @@ static place find_place(const shade_run *run, int x, int y)
     return p;
 }
 
-/* Whether the 3x3 history pixels around (x, y) show the pixel's material at depths around p's; (x, y) itself must where
- * the pixel is alone. */
+/* Whether history pixel (x, y) shows the surface of p or, where p is not alone, the 3x3 around it show its material at
+ * depths around p's. */
 static bool shows(const shade_run *run, int x, int y, uint32_t id, const place *p)
 {
     double low = 2 * far_depth, high = 0, z = p->then;
-    bool agrees = !p->alone;
     for (int i = 0; i < 9; i++) {
         int nx = x + i % 3 - 1, ny = y + i / 3 - 1;
         double t = depth_at(run, TAA_LAST_DEPTH, nx, ny);
         if (run->images[TAA_STENCIL] && tap_id(run, TAA_LAST_STENCIL, nx, ny) != id)
             continue;
+        if (p->alone && i == 4)
+            return fabs(t - z) <= 0.04 * z;
         low = fmin(low, t);
         high = fmax(high, t);
-        agrees = agrees || (i == 4 && fabs(t - z) <= 0.04 * z);
     }
-    return agrees && z >= low * 0.98 && z <= high * 1.02;
+    return !p->alone && z >= low * 0.98 && z <= high * 1.02;
 }
 
 /* Weights of the samples at -2 … 3 for a place t in 0…1 ("Spline36"). */
@@ -204,6 +204,8 @@ void twin_taa(const shade_run *run, int x, int y, double *out)
         return;
     int nx = (int)ceil(px - 0.5), ny = (int)ceil(py - 0.5); /* nearest, halves down */
     uint32_t id = run->images[TAA_STENCIL] ? shade_id(run->images[TAA_STENCIL], f, x, y) : 0;
+    if (p->exclude[id / 32] >> id % 32 & 1)
+        return;
     double n = tap(run, TAA_LAST_COUNT, 0, nx, ny);
     if (!shows(run, nx, ny, id, &at) || (n < 0 && (at.alone || (at.behind && !at.follows))))
         return;
