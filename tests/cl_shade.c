@@ -211,7 +211,10 @@ static bool add_arguments(launch *l, const shade_run *run)
     if (!add_buffer(l, &run->frame, sizeof run->frame) || !add_materials(l, run->materials))
         return false;
     size_t n = run->frame.lights > 0 ? (size_t)run->frame.lights : 1;
-    return !pass->lights || add_buffer(l, run->frame.lights ? run->lights : &none, n * sizeof(light_t));
+    const ambient_t dark = {0};
+    if (pass->lights && !add_buffer(l, run->frame.lights ? run->lights : &none, n * sizeof(light_t)))
+        return false;
+    return !pass->ambient || add_buffer(l, run->ambient ? run->ambient : &dark, sizeof dark);
 }
 
 static int lanes_of(const shade_run *run)

@@ -163,7 +163,7 @@ static void look_at_disoccluded(const temporal_scene *s, int number, temporal_re
     for (int y = 0; y < s->height; y++) {
         for (int x = 0; x < s->width; x++) {
             size_t i = (size_t)(y * s->width + x);
-            if (!all_one(&r->frame, x, y) || !temporal_disoccluded(s, number, x, y, 1.5))
+            if (!all_one(&r->frame, x, y) || !temporal_disoccluded(s, number, x, y, 1))
                 continue;
             r->disoccluded++;
             r->disoccluded_difference =
@@ -179,7 +179,7 @@ typedef struct trail {
 
 static void look_beside_sphere(const temporal_scene *s, int number, const temporal_report *r, trail *t)
 {
-    for (int y = s->height / 4; y < s->height * 3 / 4; y++) {
+    for (int y = s->height * 3 / 8; y < s->height * 5 / 8; y++) { /* where the outline is upright */
         for (int x = 0; x < s->width; x++) {
             size_t i = (size_t)(y * s->width + x);
             double d = temporal_beside_sphere(s, number, x, y);

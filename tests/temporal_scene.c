@@ -125,9 +125,9 @@ static double texture(double u, double v, int channel)
     double p = 0.7 * channel;
     double t = 0.5 + 0.12 * sin(2 * PI * u / 23 + p) * cos(2 * PI * v / 17) + 0.08 * sin(2 * PI * (u + v) / 9.1 + p) +
                0.05 * sin(2 * PI * (0.8 * u - 1.1 * v) / 4.3 + p);
-    bool tile = fmod(floor(u / 14) + floor(v / 11), 2) == 0;
+    bool tile = fmod(floor(u / 28) + floor(v / 22), 2) == 0;
     bool line = fabs(fmod(u + 0.4 * v, 31)) < 1.5;
-    return t + (tile ? 0.08 : -0.08) - (line ? 0.12 : 0);
+    return t + (tile ? 0.06 : -0.06) - (line ? 0.08 : 0);
 }
 
 static void shade(const temporal_scene *s, const hit *h, double *rgb)

@@ -9,6 +9,7 @@
  *     constant frame_t *       size, number, cameras            (kernels/shared.h)
  *     constant material_t *    one entry a dense stencil index  (generated: every registered pass's rows)
  *     constant light_t *       when .lights is set
+ *     constant ambient_t *     when .ambient is set
  *     constant float *         when .tables is set: what the host computed
  */
 #ifndef RL_MODEL_PASS_H
@@ -128,6 +129,8 @@ typedef struct rl_port {
     const char *help;
     bool optional;     /* READ: may be absent; the kernel sees NULL and HAS_NAME 0 */
     const char *if_absent; /* optional READ: what the pass does without it, said once in the log; NULL = not worth a word */
+    const char *needed_by; /* optional READ: "diffuse: sg" is a shading key of this pass and a word of it; a material with a
+                              profile and that word makes the port required (graph.h); NULL = none does */
     const char *of;    /* HISTORY: the port (own output first, else own input) whose past this is */
     rl_layout layout;  /* the layout that the kernel wants; the plan inserts the conversion */
     bool any_layout;   /* WRITE: the kernel stores through RL_STORE, so the plan may choose (LAYOUT_NAME) */
@@ -167,7 +170,7 @@ typedef struct rl_pass {
     const char *help;        /* one line */
     const char *source;      /* paper, talk, equation */
     const char *kernel;      /* file in kernels/, or NULL when kernel_text is set */
-    const char *kernel_prelude; /* another file in kernels/, put in front of it; NULL = none */
+    const char *kernel_prelude; /* other files in kernels/, put in front of it: "a.cl b.cl"; NULL = none */
     const char *kernel_text; /* the program itself, for passes built at run time; named kernel_file in errors */
     const char *kernel_file;
     rl_params params;
@@ -182,6 +185,7 @@ typedef struct rl_pass {
         size_t n;
     } steps;
     bool lights; /* the kernel gets the lights, and the run the shadow layers that they use */
+    bool ambient; /* the kernel gets the ambient light */
     /* Computes constant tables from parameters and materials, in double, into `arena`; NULL = none. Pure. */
     rl_code (*tables)(const rl_pass_input *in, rl_arena *arena, rl_tables *out, rl_error *err);
     const void *data; /* for .tables of a pass that is built at run time; the engine does not look at it */

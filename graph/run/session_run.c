@@ -1,4 +1,5 @@
 /* Frames through a session: in batches from files to files, or one at a time. */
+#include <limits.h>
 #include <string.h>
 #include <time.h>
 
@@ -28,7 +29,6 @@ static rl_code fit_buffers(rl_sequence *q, rl_frame *f, rl_error *err)
 
 rl_code rl_session_execute(rl_session *s, rl_sequence *q, rl_frame *f, bool cut, rl_error *err)
 {
-    (void)s;
     rl_code code = rl_executor_resize(q->executor, &f->geometry, err);
     if (code)
         return code;
@@ -36,7 +36,8 @@ rl_code rl_session_execute(rl_session *s, rl_sequence *q, rl_frame *f, bool cut,
         rl_executor_cut(q->executor);
     rl_session_light_values(q, &f->camera, q->light_values);
     rl_frame_values values = {
-        .number = f->number, .camera = f->camera, .lights = q->light_values, .n_lights = (int)q->n_lights};
+        .number = f->number, .camera = f->camera, .lights = q->light_values, .n_lights = (int)q->n_lights,
+        .ambient = &s->ambient};
     return rl_executor_run(q->executor, f->buffers, &values, NULL, err);
 }
 
@@ -346,6 +347,8 @@ rl_code rl_session_process(rl_session *s, size_t capture, long long number, cons
     s->processed = false;
     if (capture >= s->n_sequences)
         return rl_fail(err, RL_E_USAGE, RL_NOWHERE, "there is no capture %zu", capture);
+    if (number < INT_MIN || number > INT_MAX)
+        return rl_fail(err, RL_E_USAGE, RL_NOWHERE, "frame %lld is not within %d … %d", number, INT_MIN, INT_MAX);
     rl_sequence *q = &s->sequences[capture];
     rl_code code = rl_session_prepare(s, err);
     if (code)
