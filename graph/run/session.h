@@ -35,6 +35,7 @@ typedef struct rl_sequence {
     light_t *light_values; /* of the frame that runs */
     rl_light_planes shadow, thickness;
     const rl_materials *materials;
+    const rl_node *nodes; /* the pipeline's, with this capture's sets of materials */
     const rl_graph *graph;
     const rl_plan *plan;
     rl_geometry geometry; /* of the first frame */
