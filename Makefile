@@ -4,11 +4,12 @@
 #   make test        install what the tests miss, build, run them all
 #   make             build build/relit, build/librelit.a, build/librelit.so and the modules
 #   make test-asan   the tests under AddressSanitizer and UndefinedBehaviorSanitizer
+#   make fuzz        changed inputs against parsers and readers, FUZZ_SECONDS=60 each
 #   make bench       kernels and codecs against their peers
 #   make accuracy    TRUTH=folder: every model against a path-traced truth (tests/accuracy.c)
 #   make install     PREFIX=/usr/local: program, library, headers, relit.pc, configs, kernels
 #   make deps        Debian packages
-#   make format      clang-format; make layers: includes point one way only
+#   make format      clang-format 14 (make format-check only looks); make layers: includes point one way only
 
 BUILD   ?= build
 PREFIX  ?= /usr/local
@@ -48,7 +49,11 @@ LIB_O   := $(LIB_C:%.c=$(BUILD)/%.o) $(LIB_CXX:%.cc=$(BUILD)/%.o) $(BUILD)/kerne
 TOOL_O  := $(TOOL_C:%.c=$(BUILD)/%.o)
 MAIN_O  := $(BUILD)/graph/tool/relit.o
 TESTS   := $(patsubst tests/%.c,$(BUILD)/tests/%,$(wildcard tests/test_*.c))
-HELP_O  := $(patsubst tests/%.c,$(BUILD)/tests/%.o,$(filter-out tests/test_%.c tests/bench_%.c tests/example.c tests/accuracy.c,$(wildcard tests/*.c)))
+SCRIPTS := $(wildcard tests/test_*.sh)
+# Programs of their own; all other files in tests/ are helpers that they share.
+MAINS   := tests/test_%.c tests/bench_%.c tests/fit_%.c tests/make_%.c tests/example.c tests/accuracy.c tests/temporal.c tests/fuzz/main.c
+BENCHES := $(patsubst tests/%.c,$(BUILD)/tests/%,$(wildcard tests/bench_*.c))
+HELP_O  := $(patsubst tests/%.c,$(BUILD)/tests/%.o,$(filter-out $(MAINS),$(wildcard tests/*.c tests/fuzz/*.c)))
 
 all: $(BUILD)/relit $(BUILD)/librelit.a $(BUILD)/librelit.so $(BUILD)/relit_oiio.so
 
@@ -97,6 +102,9 @@ $(BUILD)/kernels.c: $(KERNELS) Makefile
 $(BUILD)/kernels.o: $(BUILD)/kernels.c
 	$(Q)$(CC) $(CPPFLAGS) $(CFLAGS) -c $< -o $@
 
+# Loops over every sample of a frame: gcc vectorizes them from -O3 on.
+$(BUILD)/graph/run/ingest.o: OPT += -O3
+
 # Where `make install` puts things that are looked for at run time; a build tree finds its own first.
 $(BUILD)/graph/run/image_module.o: CPPFLAGS += -DRL_MODULE_DIR='"$(PREFIX)/lib/relit"'
 $(BUILD)/graph/run/data_files.o: CPPFLAGS += -DRELIT_DATADIR='"$(PREFIX)/share/relit/configs"'
@@ -124,23 +132,42 @@ $(BUILD)/tests/%: $(BUILD)/tests/%.o $(BUILD)/tests/sanitizers.o $(BUILD)/tests/
 	$(call say,link $@)
 	$(Q)$(CC) $(LDFLAGS) -o $@ $^ $(LIBS) -lcmocka
 
-# It loads the module; so does whatever writes PNG files.
-$(BUILD)/tests/test_image_file: | $(BUILD)/relit_oiio.so
+# They load the module; so does whatever writes PNG files.
+$(BUILD)/tests/test_image_file $(BUILD)/tests/test_sg_run: | $(BUILD)/relit_oiio.so
 
-test-build: all $(TESTS)
+test-build: all $(TESTS) $(BENCHES)
 
 test: deps
 	@$(MAKE) --no-print-directory -j2 test-build layers
-	@BUILD=$(BUILD) tests/run.sh $(TESTS)
+	@BUILD=$(BUILD) tests/run.sh $(TESTS) $(SCRIPTS)
 
-test-asan:
-	@$(MAKE) --no-print-directory -j2 BUILD=build-asan SAN="-fsanitize=address,undefined -fno-sanitize-recover=undefined" test-build
-	@BUILD=build-asan ASAN_OPTIONS=detect_leaks=0 tests/run.sh $(patsubst $(BUILD)/%,build-asan/%,$(TESTS))
+SANITIZE = -fsanitize=address,undefined -fno-sanitize-recover=undefined
+ASAN     = BUILD=build-asan SAN="$(SANITIZE)"
+
+test-asan: deps
+	@$(MAKE) --no-print-directory -j2 $(ASAN) test-build
+	@$(ASAN) ASAN_OPTIONS=detect_leaks=0 tests/run.sh $(patsubst $(BUILD)/%,build-asan/%,$(TESTS))
+
+# Kernels and codecs against their peers; tests/bench_batch.sh says what can be chosen.
+bench: all $(BENCHES)
+	$(BUILD)/tests/bench_sss
+	@BUILD=$(BUILD) tests/bench_batch.sh
+
+$(BUILD)/tests/fuzz/fuzz: $(BUILD)/tests/fuzz/main.o $(BUILD)/tests/sanitizers.o $(BUILD)/tests/help.a $(BUILD)/tool.a $(BUILD)/librelit.a
+	$(call say,link $@)
+	$(Q)$(CC) $(LDFLAGS) -o $@ $^ $(LIBS) -lcmocka
+
+# Changed inputs against parsers and readers, under the sanitizers; tests/test_fuzz.c is its short form.
+FUZZ_SECONDS ?= 60
+FUZZ_SEED    ?= $(shell date +%s)
+fuzz: deps
+	@$(MAKE) --no-print-directory -j2 $(ASAN) build-asan/tests/fuzz/fuzz
+	@ASAN_OPTIONS=detect_leaks=0 build-asan/tests/fuzz/fuzz --seconds $(FUZZ_SECONDS) --seed $(FUZZ_SEED)
 
 # ---- the rest --------------------------------------------------------------------------------------------------
 
 DEB = build-essential pkg-config libopenexr-dev libopenimageio-dev libopencolorio-dev pocl-opencl-icd ocl-icd-opencl-dev \
-      opencl-headers libyaml-dev libjansson-dev libxxhash-dev libdeflate-dev libisal-dev libcmocka-dev libgraphviz-dev
+      opencl-headers libyaml-dev libjansson-dev libxxhash-dev libdeflate-dev libisal-dev libcmocka-dev libgraphviz-dev clang-format
 
 # Asks for root rights only when something is missing.
 deps:
@@ -175,6 +202,8 @@ VERSION := $(shell sed -n 's/^.define RL_VERSION "\(.*\)"/\1/p' graph/relit.h)
 FORMATTED = $(shell git ls-files '*.c' '*.h' '*.cc' '*.hh')
 format:
 	clang-format -i $(FORMATTED)
+format-check:
+	@tests/test_format.sh
 
 layers:
 	@tests/layers.sh
@@ -182,4 +211,4 @@ layers:
 clean:
 	rm -rf $(BUILD) build-asan
 
-.PHONY: all accuracy demo test test-build test-asan deps install format layers clean
+.PHONY: all demo bench test test-build test-asan deps install format format-check layers clean fuzz accuracy

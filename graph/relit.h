@@ -30,6 +30,8 @@ typedef struct rl_session rl_session;
 /* ---- opening ---------------------------------------------------------------------------------------------
  */
 
+/* A frame whose files are missing or broken: an error of that frame; or no output for it; or the layers and the
+ * camera of the frame before it in the run under its number. Whichever, history ends there. */
 typedef enum rl_on_missing { RL_MISSING_ERROR, RL_MISSING_SKIP, RL_MISSING_HOLD } rl_on_missing;
 
 /* A value of the pipeline by its dotted path: {"graph.sss.taps", "55"}. `value` is one YAML value; "null"
@@ -76,7 +78,7 @@ rl_code rl_session_prepare(rl_session *session, rl_error *err);
 
 size_t rl_session_captures(const rl_session *session);
 const char *rl_session_capture_name(const rl_session *session, size_t capture);
-/* Frame numbers that a run processes, in order. */
+/* Frame numbers that a run processes, in order; 0 for captures and frames that do not exist. */
 size_t rl_session_frames(const rl_session *session, size_t capture);
 long long rl_session_frame(const rl_session *session, size_t capture, size_t i);
 
@@ -153,14 +155,15 @@ rl_code rl_session_process(rl_session *session, size_t capture, long long frame,
 void rl_session_cut(rl_session *session);
 
 /* An image that the session's outputs (or `dump`) ask for, of the last processed frame: "light.diffuse".
- * Planes R, G, B and such; ids are given as floats' bits (format "id"). Valid until the next call that
+ * Planes R, G, B and such; ids, as the capture has them, are given as floats' bits (format "id"). Valid until the next call that
  * processes or closes. */
 typedef struct rl_image_view {
     int x, y, width, height; /* data window */
     int planes;
     const char *format; /* "rgb", "normal", "vec2", "scalar", "id", "lights" */
-    const float *plane[16];
-    size_t stride; /* floats from row to row */
+    const float *plane[16]; /* the first 16; "lights" may have more */
+    size_t stride;          /* floats from row to row */
+    size_t plane_stride;    /* from plane to plane: plane i is at plane[0] + i * plane_stride */
 } rl_image_view;
 
 rl_code rl_session_image(rl_session *session, const char *image, rl_image_view *out, rl_error *err);

@@ -128,6 +128,20 @@ static inline float scatter_nearest(floatv v, intv mask)
     return as_float(big - max(0, scatter_max_int((big - rl_as_intv(v)) & mask)));
 }
 
+/* 2^x for x <= 0, relative error below 3e-6; x below -125 counts as -125: nothing beside any other weight. */
+static inline floatv weight_exp2(floatv x)
+{
+    const float magic = 12582912.0f;
+    x = fmax(x, -125.0f);
+    floatv r = x + magic, t = x - (r - magic);
+    floatv p = 9.57010191e-3f; /* minimax, degree 4 */
+    p = fma(p, t, 5.59178603e-2f);
+    p = fma(p, t, 2.40247448e-1f);
+    p = fma(p, t, 6.93121815e-1f);
+    p = fma(p, t, 9.99999261e-1f);
+    return rl_as_floatv(rl_as_intv(p) + (rl_as_intv(r) << 23)); /* magic's own low bits are 0 */
+}
+
 /* ---- the surface that a pixel sees -------------------------------------------------------------------- */
 
 /* Slope of the depth along one axis, metres a pixel: the flatter of the two differences to neighbours of the
@@ -217,21 +231,29 @@ static inline intv scatter_turned_away(const inputs_t *in, const vector_t *v, in
 }
 #endif
 
-/* Area of the surface that a pixel sees, m² on the plane z = -1 times f_x·f_y: |dP/dx × dP/dy| of
- * P = ((x - c_x)/f_x z, -(y - c_y)/f_y z, -z), for depth z with slopes from its neighbours. */
+/* Area of the surface that pixels (x, y) of depth z see, m² on the plane z = -1 times f_x·f_y: |dP/dx ×
+ * dP/dy| of P = ((x - c_x)/f_x z, -(y - c_y)/f_y z, -z); zx and zy are the slopes, metres a pixel. */
+static inline floatv scatter_area_at(constant frame_t *f, floatv x, int y, floatv z, floatv zx, floatv zy)
+{
+    constant camera_t *c = &f->camera;
+    zx *= c->focal[0];
+    zy *= c->focal[1];
+    floatv rx = rl_ray_x(f, c, x);
+    float ry = rl_ray_y(f, c, (float)y);
+    /* The cross product of (z + rx zx, ry zx, -zx) and (rx zy, ry zy - z, -zy), divided by z. */
+    floatv n = z + rx * zx - ry * zy;
+    return z * sqrt(zx * zx + zy * zy + n * n);
+}
+
+/* The same for all vectors of RL_PHASE4 planes, with slopes from the neighbours. */
 static inline void scatter_area(global const float *depth, global const uint *stencil, global float *area,
                                 constant frame_t *f)
 {
     vector_t v = scatter_vector(f);
-    constant camera_t *c = &f->camera;
-    floatv z = rl_vload(0, depth + v.at);
-    floatv zx = SCATTER_AREA_SLOPE(depth, stencil, f, &v, 1, 0) * c->focal[0];
-    floatv zy = SCATTER_AREA_SLOPE(depth, stencil, f, &v, 0, 1) * c->focal[1];
-    floatv rx = rl_ray_x(f, c, rl_to_floatv((RL_LANES + v.sx) * 4 + v.px));
-    float ry = rl_ray_y(f, c, (float)(4 * v.sy + v.py));
-    /* The cross product of (z + rx zx, ry zx, -zx) and (rx zy, ry zy - z, -zy), divided by z. */
-    floatv n = z + rx * zx - ry * zy;
-    rl_vstore(z * sqrt(zx * zx + zy * zy + n * n), 0, area + v.at);
+    floatv zx = SCATTER_AREA_SLOPE(depth, stencil, f, &v, 1, 0),
+           zy = SCATTER_AREA_SLOPE(depth, stencil, f, &v, 0, 1);
+    floatv x = rl_to_floatv((RL_LANES + v.sx) * 4 + v.px);
+    rl_vstore(scatter_area_at(f, x, 4 * v.sy + v.py, rl_vload(0, depth + v.at), zx, zy), 0, area + v.at);
 }
 
 /* ---- the way out -------------------------------------------------------------------------------------- */
@@ -258,16 +280,23 @@ static inline floatv scatter_n_dot_v(constant frame_t *f, global const float *no
     return -dot * rsqrt(rx * rx + (ry * ry + 1.0f));
 }
 
-/* color = lit + filtered · exit(albedo) · F_out, for RL_W pixels of a row; `filtered` and `stencil` are
- * RL_PHASE4. */
-static inline void scatter_resolve(global const float *filtered, global const float *lit,
-                                   global const float *albedo, global const float *normal,
-                                   global const uint *stencil, global float *color, constant frame_t *f,
-                                   constant material_t *materials)
+static inline floatv scatter_load(int layout, global const float *p, constant frame_t *f, int plane, int x,
+                                  int y)
+{
+    return layout == RL_LINEAR ? rl_load(p + plane * f->plane, rl_index(f, x, y))
+                               : rl_load4(p + plane * f->plane4, f, x, y);
+}
+
+/* color = lit + filtered · exit(albedo) · F_out, for RL_W pixels of a row; `filtered` and `stencil` have the
+ * layout that is given. */
+static inline void scatter_resolve_from(int layout, global const float *filtered, global const float *lit,
+                                        global const float *albedo, global const float *normal,
+                                        global const uint *stencil, global float *color, constant frame_t *f,
+                                        constant material_t *materials)
 {
     int x = RL_W * (int)get_global_id(0), y = get_global_id(1);
     int at = rl_index(f, x, y);
-    intv id = rl_as_intv(rl_load4((global const float *)stencil, f, x, y));
+    intv id = rl_as_intv(scatter_load(layout, (global const float *)stencil, f, 0, x, y));
     intv pre_post = 0, disney = 0, scatters = 0, left = id != 0;
     while (scatter_any(left)) {
         int m = scatter_max_int(id & left);
@@ -289,9 +318,18 @@ static inline void scatter_resolve(global const float *filtered, global const fl
         if (scatter_any(scatters)) {
             floatv a = rl_load(albedo + c * f->plane, at);
             a = rl_select(a, sqrt(a), pre_post);
-            floatv v = rl_load4(filtered + c * f->plane4, f, x, y) * a * out;
+            floatv v = scatter_load(layout, filtered, f, c, x, y) * a * out;
             sum += scatter_keep(v, scatters);
         }
         rl_store(sum, color + c * f->plane, at);
     }
+}
+
+/* The same from RL_PHASE4. */
+static inline void scatter_resolve(global const float *filtered, global const float *lit,
+                                   global const float *albedo, global const float *normal,
+                                   global const uint *stencil, global float *color, constant frame_t *f,
+                                   constant material_t *materials)
+{
+    scatter_resolve_from(RL_PHASE4, filtered, lit, albedo, normal, stencil, color, f, materials);
 }

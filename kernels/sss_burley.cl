@@ -89,20 +89,6 @@ static inline uint2 pattern_choice(int rotation, int seed, int number, int px, i
     return choice + (uint2)(rl_hash((uint)seed, 0, 0, 1), rl_hash((uint)seed, 0, 0, 2));
 }
 
-/* 2^x for x <= 0, relative error below 3e-6; x below -125 counts as -125: nothing beside any other weight. */
-static inline floatv weight_exp2(floatv x)
-{
-    const float magic = 12582912.0f;
-    x = fmax(x, -125.0f);
-    floatv r = x + magic, t = x - (r - magic);
-    floatv p = 9.57010191e-3f; /* minimax, degree 4 */
-    p = fma(p, t, 5.59178603e-2f);
-    p = fma(p, t, 2.40247448e-1f);
-    p = fma(p, t, 6.93121815e-1f);
-    p = fma(p, t, 9.99999261e-1f);
-    return rl_as_floatv(rl_as_intv(p) + (rl_as_intv(r) << 23)); /* magic's own low bits are 0 */
-}
-
 /* Taps first…first+n-1, n <= TAP_BLOCK: index of the vector, radius² in units of d, weight, and for
  * weighting: surface how many pixels away, x before y. There are RL_W more indices behind the last, for
  * looking ahead. */

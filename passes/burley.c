@@ -43,10 +43,9 @@ void rl_burley_taps(size_t n, double offset, float *x, float *y, float *weight)
 }
 
 const rl_param rl_scatter_profile_rows[RL_SCATTER_PROFILE_ROWS] = {
-    RL_ROW_SCATTER_DISTANCE,
+    RL_ROW_SCATTER_DISTANCE(.required = true),
     RL_ROW_TEXTURING,
-    M_ENUM(border, "renormalize|occlude", 0,
-           "samples of other materials and outside of the image: not counted, or black"),
+    RL_ROW_BORDER,
 };
 
 const rl_param rl_scatter_shading_rows[RL_SCATTER_SHADING_ROWS] = {

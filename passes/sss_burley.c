@@ -22,8 +22,7 @@ static const rl_param params[] = {
            "normalized, so that hollows send back more and bumps less",
            .structural = true),
     P_ENUM(sss_burley_params, rotation, "none|white|ign|blue", 3,
-           "turn and spread the pattern for each of 4x4 pixels and each frame: never, at random, by "
-           "interleaved gradient noise, or so that neighbours and frames complement each other"),
+           "how the pattern changes from pixel to pixel and from frame to frame; blue: neighbours complement each other"),
     P(sss_burley_params, RL_I32, seed, 0, 2147483647, 0, "", "another choice of patterns"),
 };
 RL_PARAMS_MATCH(sss_burley_params, 5);

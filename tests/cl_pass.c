@@ -10,6 +10,7 @@
 
 #include "graph/base/alloc.h"
 #include "graph/base/text.h"
+#include "graph/model/params.h"
 
 #define KEPT    32
 #define OPTIONS "-cl-std=CL1.2 -cl-mad-enable -cl-no-signed-zeros -cl-finite-math-only"
@@ -84,13 +85,12 @@ void cl_close(cl_session **s)
 
 /* ---- programs ---- */
 
-static void add_fields(rl_str *s, const rl_params *rows, const char *group)
+static void add_fields(rl_str *s, const rl_params *rows, const char *prefix)
 {
     for (size_t i = 0; i < rows->n; i++) {
-        const rl_param *r = &rows->rows[i];
-        const char *type = r->type == RL_F32 || r->type == RL_RGBF ? "float" : "int";
-        rl_str_printf(s, "    %s %s%s%s%s;\n", type, group, *group ? "_" : "", r->name,
-                      r->type == RL_RGBF ? "[3]" : "");
+        rl_str_add(s, "    ");
+        rl_param_field(&rows->rows[i], prefix, s);
+        rl_str_add(s, "\n");
     }
 }
 
@@ -145,9 +145,9 @@ static bool program_text(const cl_job *job, rl_str *s)
     rl_str_printf(s, "typedef struct params_t {\n");
     add_fields(s, &pass->params, "");
     rl_str_printf(s, "} params_t;\ntypedef struct material_t {\n    int has_profile;\n");
-    add_fields(s, &pass->profile_keys, "profile");
-    add_fields(s, &pass->material_keys, "material");
-    add_fields(s, &pass->shading_keys, "shading");
+    add_fields(s, &pass->profile_keys, "profile_");
+    add_fields(s, &pass->material_keys, "material_");
+    add_fields(s, &pass->shading_keys, "shading_");
     rl_str_printf(s, "} material_t;\n");
     for (size_t i = 0; i < pass->params.n; i++)
         if (pass->params.rows[i].structural)
@@ -246,7 +246,9 @@ done:
 static bool run_steps(cl_session *s, const cl_job *job, cl_program program, const cl_args *args)
 {
     const rl_pass *pass = job->pass;
-    for (size_t i = 0; i < pass->steps.n; i++)
+    for (size_t i = 0; i < pass->steps.n; i++) {
+        if (!rl_step_runs(pass, &pass->steps.rows[i], job->params))
+            continue;
         for (int again = 0; again < (job->repeat > 1 ? job->repeat : 1); again++) {
             double ms = run_step(s, job, program, &pass->steps.rows[i], args);
             if (ms < 0)
@@ -254,6 +256,7 @@ static bool run_steps(cl_session *s, const cl_job *job, cl_program program, cons
             if (job->ms && (again == 0 || ms < job->ms[i]))
                 job->ms[i] = ms;
         }
+    }
     return true;
 }
 

@@ -96,7 +96,7 @@ static const rl_port blur_ports[] = {
 };
 
 static const rl_step blur_steps[] = {
-    {"blur", RL_EVERY_PIXEL}
+    {"blur", .domain = RL_EVERY_PIXEL}
 };
 
 static const rl_param blur_profile[] = {

@@ -20,21 +20,57 @@ static size_t bytes_of(rl_exr_pixel type)
     return type == RL_EXR_HALF ? 2 : 4;
 }
 
+static void declare_header(exr_context_t ctx, int part, const made_header *h)
+{
+    exr_attr_m44f_t matrix;
+    if (h->matrix) {
+        memcpy(matrix.m, h->matrix, sizeof matrix.m);
+        OK(exr_attr_set_m44f(ctx, part, "worldToCamera", &matrix));
+    }
+    if (h->fov_x > 0)
+        OK(exr_attr_set_float(ctx, part, "camera:fovx", h->fov_x));
+    if (h->jitter) {
+        exr_attr_v2f_t jitter = {.x = h->jitter[0], .y = h->jitter[1]};
+        OK(exr_attr_set_v2f(ctx, part, "camera:jitter", &jitter));
+    }
+    if (h->time_code[0]) {
+        exr_attr_timecode_t code = {h->time_code[0], h->time_code[1]};
+        OK(exr_attr_set_timecode(ctx, part, "timeCode", &code));
+    }
+    if (h->fps[0]) {
+        exr_attr_rational_t fps = {h->fps[0], (uint32_t)h->fps[1]};
+        OK(exr_attr_set_rational(ctx, part, "framesPerSecond", &fps));
+    }
+    if (h->owner)
+        OK(exr_attr_set_string(ctx, part, "owner", h->owner));
+}
+
 static void declare(exr_context_t ctx, const made_part *p)
 {
+    static const made_header plain;
+    const made_header *h = p->header ? p->header : &plain;
     int part;
-    exr_attr_v2f_t center = {0};
-    exr_attr_box2i_t window;
+    exr_attr_v2f_t center = {.x = h->screen_center[0], .y = h->screen_center[1]};
+    exr_attr_box2i_t window, display;
     window.min.x = p->x0;
     window.min.y = p->y0;
     window.max.x = p->x0 + p->width - 1;
     window.max.y = p->y0 + p->height - 1;
+    display = window;
+    if (h->display[2] > 0) {
+        display.min.x = h->display[0];
+        display.min.y = h->display[1];
+        display.max.x = h->display[0] + h->display[2] - 1;
+        display.max.y = h->display[1] + h->display[3] - 1;
+    }
     exr_storage_t storage = p->deep   ? EXR_STORAGE_DEEP_SCANLINE
                             : p->tile ? EXR_STORAGE_TILED
                                       : EXR_STORAGE_SCANLINE;
     OK(exr_add_part(ctx, p->name, storage, &part));
-    OK(exr_initialize_required_attr(ctx, part, &window, &window, 1.0f, &center, 1.0f,
-                                    EXR_LINEORDER_INCREASING_Y, (exr_compression_t)p->compression));
+    OK(exr_initialize_required_attr(ctx, part, &display, &window, h->aspect > 0 ? h->aspect : 1.0f, &center,
+                                    h->screen_width > 0 ? h->screen_width : 1.0f, EXR_LINEORDER_INCREASING_Y,
+                                    (exr_compression_t)p->compression));
+    declare_header(ctx, part, h);
     if (p->tile)
         OK(exr_set_tile_descriptor(ctx, part, (uint32_t)p->tile, (uint32_t)p->tile,
                                    p->mipmap ? EXR_TILE_MIPMAP_LEVELS : EXR_TILE_ONE_LEVEL,

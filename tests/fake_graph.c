@@ -6,11 +6,11 @@
 #include <cmocka.h>
 
 static const rl_step one_step[] = {
-    {"run", RL_EVERY_VECTOR}
+    {"run", .domain = RL_EVERY_VECTOR}
 };
 static const rl_step two_steps[] = {
-    {"prepare", RL_EVERY_VECTOR},
-    {"filter",  RL_EVERY_PHASE }
+    {"prepare", .domain = RL_EVERY_VECTOR},
+    {"filter", .domain = RL_EVERY_PHASE }
 };
 
 static const rl_port lighting_ports[] = {

@@ -124,9 +124,9 @@ static size_t make_ports(maker *m, rl_port *ports, rl_node_input *inputs, size_t
 static void make_node(maker *m, size_t index, rl_node *node)
 {
     static const rl_step steps[] = {
-        {"a", RL_EVERY_PIXEL },
-        {"b", RL_EVERY_VECTOR},
-        {"c", RL_EVERY_PHASE }
+        {"a", .domain = RL_EVERY_PIXEL },
+        {"b", .domain = RL_EVERY_VECTOR},
+        {"c", .domain = RL_EVERY_PHASE }
     };
     rl_port *ports = rl_arena_array(m->arena, MOST_PORTS, sizeof *ports);
     rl_node_input *inputs = rl_arena_array(m->arena, MOST_PORTS, sizeof *inputs);
@@ -152,7 +152,7 @@ static void make_wanted(maker *m, size_t index, rl_wanted *wanted)
         { .name = "to", .role = RL_WRITE, .format = RL_RGB, .any_layout = true},
     };
     static const rl_step steps[] = {
-        {"a", RL_EVERY_VECTOR}
+        {"a", .domain = RL_EVERY_VECTOR}
     };
     static const rl_pass convert = {.name = "convert", .ports = RL_ARRAY(ports), .steps = RL_ARRAY(steps)};
     static const int params[2];

@@ -231,7 +231,7 @@ static void test_functions(void **state)
     rl_str text = {0};
     float *in = rl_malloc(6 * N * sizeof *in), *out = in + 3 * N;
     static const rl_param params[] = {P(rl_color_params, RL_F32, exposure, -64, 64, 0, "stops", "unused")};
-    static const rl_step steps[] = {{"functions", RL_EVERY_VECTOR}};
+    static const rl_step steps[] = {{"functions", .domain = RL_EVERY_VECTOR}};
     double log_error = 0, exp_error = 0, hue_error = 0;
     (void)state;
     for (const char *const *piece = rl_color_prelude; *piece; piece++)

@@ -76,7 +76,7 @@ static void make(const char *path, rl_exr_compression compression, int tile)
         {"b", RL_EXR_FLOAT, 0, floats},
         {"c", RL_EXR_UINT,  0, words }
     };
-    const made_part part = {NULL, -3, 5, W, H, compression, tile, false, false, channels, 3};
+    const made_part part = {NULL, -3, 5, W, H, compression, tile, false, false, channels, 3, NULL};
     if (compression < RL_EXR_DWAA) {
         made_write(path, &part, 1);
         return;
@@ -205,7 +205,7 @@ static void cannot_be_read(void **state)
         {"RY", RL_EXR_HALF, 2, halves},
         {"Y",  RL_EXR_HALF, 0, halves}
     };
-    const made_part sampled = {NULL, 0, 0, 16, 16, RL_EXR_ZIP, 0, false, false, channels, 2};
+    const made_part sampled = {NULL, 0, 0, 16, 16, RL_EXR_ZIP, 0, false, false, channels, 2, NULL};
     made_write(made_path("sampled.exr"), &sampled, 1);
     expect(made_path("sampled.exr"), RL_E_FORMAT, "'RY' is subsampled");
     rl_exr *file; /* the other channel can be read, with the subsampled one stepped over */
@@ -221,7 +221,7 @@ static void cannot_be_read(void **state)
     assert_non_null(strstr(err.text, "no channel 'Z'"));
     rl_exr_close(&file);
 
-    const made_part deep = {NULL, 0, 0, 16, 16, RL_EXR_ZIPS, 0, false, true, &channels[1], 1};
+    const made_part deep = {NULL, 0, 0, 16, 16, RL_EXR_ZIPS, 0, false, true, &channels[1], 1, NULL};
     made_write(made_path("deep.exr"), &deep, 1);
     expect(made_path("deep.exr"), RL_E_FORMAT, "deep");
 }

@@ -106,8 +106,8 @@ static void tiled_and_multipart(void **state)
     fill_tiles();
     for (int c = 0; c <= RL_EXR_PIZ; c++) {
         const made_part parts[] = {
-            {"beauty", 0,   0,  TILES_W, TILES_H, RL_EXR_ZIP,            0,    false, false, tile_channels, 3},
-            {"data",   -11, -3, TILES_W, TILES_H, (rl_exr_compression)c, TILE, true,  false, tile_channels, 3},
+            {"beauty", 0,   0,  TILES_W, TILES_H, RL_EXR_ZIP,            0,    false, false, tile_channels, 3, NULL},
+            {"data",   -11, -3, TILES_W, TILES_H, (rl_exr_compression)c, TILE, true,  false, tile_channels, 3, NULL},
         };
         made_write(made_path("parts.exr"), parts, 2);
         rl_exr *file;
@@ -210,7 +210,7 @@ static void one_channel_twice(void **state)
         {"id", RL_EXR_UINT, 0, id}
     };
     for (int c = RL_EXR_NONE; c <= RL_EXR_ZIP; c++) {
-        const made_part part = {NULL, 0, 0, W, H, (rl_exr_compression)c, 0, false, false, channels, 2};
+        const made_part part = {NULL, 0, 0, W, H, (rl_exr_compression)c, 0, false, false, channels, 2, NULL};
         made_write(made_path("twice.exr"), &part, 1);
         rl_exr *file;
         rl_error err = {0};
@@ -245,7 +245,7 @@ static void nonfinite_values(void **state)
         {"f", RL_EXR_FLOAT, 0, f},
         {"h", RL_EXR_HALF,  0, h}
     };
-    const made_part part = {NULL, 0, 0, W, H, RL_EXR_ZIPS, 0, false, false, channels, 2};
+    const made_part part = {NULL, 0, 0, W, H, RL_EXR_ZIPS, 0, false, false, channels, 2, NULL};
     made_write(made_path("nan.exr"), &part, 1);
     unsigned bad = 0, inf = 0;
     for (int i = 0; i < W * H; i++) {
@@ -286,7 +286,7 @@ static rl_code read_value(rl_exr_pixel type, const void *value, bool as_id, uint
     float floats[12] = {0};
     memcpy((char *)pixels + 6 * (type == RL_EXR_HALF ? 2 : 4), value, type == RL_EXR_HALF ? 2 : 4);
     const made_channel channel = {"v", type, 0, pixels};
-    const made_part part = {NULL, 10, 20, 4, 3, RL_EXR_ZIP, 0, false, false, &channel, 1};
+    const made_part part = {NULL, 10, 20, 4, 3, RL_EXR_ZIP, 0, false, false, &channel, 1, NULL};
     made_write(made_path("value.exr"), &part, 1);
     rl_exr *file;
     *err = (rl_error){0};
@@ -351,7 +351,7 @@ static void limits(void **state)
 {
     (void)state;
     fill_tiles();
-    const made_part part = {NULL, 0, 0, TILES_W, TILES_H, RL_EXR_ZIP, 0, false, false, tile_channels, 3};
+    const made_part part = {NULL, 0, 0, TILES_W, TILES_H, RL_EXR_ZIP, 0, false, false, tile_channels, 3, NULL};
     const uint64_t plane = sizeof tiles_a;
     made_write(made_path("limit.exr"), &part, 1);
     rl_exr *file;

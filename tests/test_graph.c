@@ -10,7 +10,7 @@
 #include "graph/model/graph.h"
 
 static const rl_step one_step[] = {
-    {"run", RL_EVERY_PIXEL}
+    {"run", .domain = RL_EVERY_PIXEL}
 };
 #define FAKE(name_, ports_)                                                                                  \
     {                                                                                                        \
@@ -310,7 +310,8 @@ static void converts_outputs(void **state)
     const rl_wanted wrong = {"z", AT(23), depth, one, with_p3, 1},
                     gone = {"q", AT(24), unknown, NULL, NULL, 1};
     assert_int_equal(build(f, standard, 3, &wrong, 1), RL_E_CONFIG);
-    assert_string_equal(f->err.text, "output 'z': port 'from' takes rgb, 'capture.depth' is scalar");
+    assert_string_equal(f->err.text, "output 'z': only rgb images are colour-converted, 'capture.depth' is scalar; leave out "
+                                     "colorspace, display, view, look and exposure");
     assert_int_equal(f->err.line, 23);
     assert_int_equal(build(f, standard, 3, &gone, 1), RL_E_CONFIG);
     assert_string_equal(f->err.text,

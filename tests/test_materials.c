@@ -181,6 +181,9 @@ static void test_wrong_ids(void **state)
     refuse("materials: {plastre: {}}",
            "t.yaml:1:13: error: material 'plastre' needs 'stencil' (an id): the capture names "
            "no id like it; did you mean 'plaster'? known: plaster, skin, wax");
+    const rl_materials *absent; /* unlike any name: not in this capture, which is no mistake */
+    assert_int_equal(resolve_used("materials: {jade: {}}", 3, 2, &absent), RL_OK);
+    assert_int_equal(absent->n_ids, 0);
     refuse("materials: {default: {stencil: 1}}",
            "t.yaml:1:32: error: material 'default' is for every id that no other "
            "material covers: it takes no 'stencil'");
@@ -300,8 +303,8 @@ static bool same_row(const rl_param *a, const rl_param *b)
 {
     return a->type == b->type && a->min == b->min && a->max == b->max &&
            !memcmp(a->def, b->def, sizeof a->def) && same_text(a->words, b->words) &&
-           same_text(a->unit, b->unit) && same_text(a->help, b->help) && a->required == b->required &&
-           a->no_default == b->no_default;
+           same_text(a->unit, b->unit) && same_text(a->help, b->help) && a->no_default == b->no_default &&
+           a->most_sum == b->most_sum && a->list.rows == b->list.rows && a->list.n == b->list.n;
 }
 
 static rl_params group_of(const rl_pass *pass, const char *group)
@@ -311,7 +314,7 @@ static rl_params group_of(const rl_pass *pass, const char *group)
                                         : pass->shading_keys;
 }
 
-/* A key means one thing, whichever pass reads it; `profile` and `stencil` are the resolver's. */
+/* A key means one thing, whichever pass reads it and needs it; `profile` and `stencil` are the resolver's. */
 static void test_registered_rows(void **state)
 {
     (void)state;

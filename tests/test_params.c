@@ -23,7 +23,7 @@ static const rl_param *row_of(const char *name)
 }
 
 typedef union any {
-    float f[3];
+    float f[64];
     int32_t i;
 } any;
 
@@ -285,13 +285,19 @@ static void check_row(const char *pass, const rl_param *row)
         fail_msg("%s: '%s' has no words", pass, row->name);
     rl_str s = {0};
     any value;
+    assert_true(rl_param_bytes(row) <= sizeof value);
+    assert_int_equal(row->type == RL_ROWS, row->list.n > 0);
+    for (size_t i = 0; i < row->list.n; i++) {
+        assert_int_not_equal(row->list.rows[i].type, RL_ROWS);
+        check_row(pass, &row->list.rows[i]);
+    }
     rl_param_default(row, &value);
     rl_param_print(row, &value, &s);
     if (!row->no_default &&
         !row->required) { /* what is printed reads back: a default outside of the range does not */
         any again = value;
         config_assert_fine(rl_param_read(row, config_parse(rl_str_text(&s)), &again, &config_error));
-        assert_memory_equal(&again, &value, RL_PARAM_BYTES(row->type));
+        assert_memory_equal(&again, &value, rl_param_bytes(row));
     }
     rl_str_free(&s);
 }
@@ -310,7 +316,7 @@ static void test_registry(void **state)
             check_row(pass->name, row);
             if (row->offset != offset)
                 fail_msg("%s: '%s' is not in the struct's order", pass->name, row->name);
-            offset += RL_PARAM_BYTES(row->type);
+            offset += rl_param_bytes(row);
             for (size_t m = 0; m < RL_ARRAY_LENGTH(also); m++)
                 assert_string_not_equal(row->name, also[m]);
             for (size_t m = 0; m < k; m++)

@@ -14,7 +14,7 @@
 #include "plan_simulator.h"
 
 static const rl_step one_step[] = {
-    {"run", RL_EVERY_VECTOR}
+    {"run", .domain = RL_EVERY_VECTOR}
 };
 #define FAKE(name_, ports_)                                                                                  \
     {                                                                                                        \

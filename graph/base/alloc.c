@@ -5,6 +5,9 @@
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
+
+#define HUGE_PAGE ((size_t)2 << 20)
 
 static atomic_size_t live, peak;
 static atomic_ulong countdown; /* 0 = off */
@@ -58,12 +61,22 @@ void *rl_realloc(void *p, size_t bytes)
     return q;
 }
 
+/* Images are walked by planes far apart: with pages of 4 KB each first touch is a fault, and address
+ * translation misses all the time. Advice only; whether there are huge pages is the system's business. */
+static void *advised(void *p, size_t bytes)
+{
+    size_t front = p ? (HUGE_PAGE - (uintptr_t)p % HUGE_PAGE) % HUGE_PAGE : 0;
+    if (p && bytes >= front + HUGE_PAGE)
+        madvise((char *)p + front, (bytes - front) / HUGE_PAGE * HUGE_PAGE, MADV_HUGEPAGE);
+    return p;
+}
+
 void *rl_aligned(size_t bytes)
 {
     if (must_fail() || bytes > SIZE_MAX - RL_ALIGN)
         return NULL;
     size_t whole = (bytes + RL_ALIGN - 1) / RL_ALIGN * RL_ALIGN;
-    return counted(aligned_alloc(RL_ALIGN, whole ? whole : RL_ALIGN));
+    return counted(advised(aligned_alloc(RL_ALIGN, whole ? whole : RL_ALIGN), whole));
 }
 
 char *rl_strdup(const char *text)
@@ -95,8 +108,8 @@ void rl_alloc_reset_peak(void)
     atomic_store(&peak, atomic_load(&live));
 }
 
-void rl_alloc_fail_at(unsigned long n, int for_good)
+unsigned long rl_alloc_fail_at(unsigned long n, int for_good)
 {
     atomic_store(&keep_failing, for_good);
-    atomic_store(&countdown, n);
+    return atomic_exchange(&countdown, n);
 }

@@ -28,8 +28,8 @@ size_t rl_alloc_peak(void);
 void rl_alloc_reset_peak(void);
 
 /* For tests: the n-th allocation from now (1 = the next) fails, and so do all after it if `for_good`;
- * n = 0 switches this off. */
-void rl_alloc_fail_at(unsigned long n, int for_good);
+ * n = 0 switches this off. Returns how many were left of the n before, 0 when it has failed. */
+unsigned long rl_alloc_fail_at(unsigned long n, int for_good);
 
 #ifdef __cplusplus
 }

@@ -10,6 +10,17 @@ static void copy_tail(char *out, size_t size, const char *text)
     memcpy(out, from, strlen(from) + 1);
 }
 
+/* Names and values of users are quoted in messages: what would break the line or the terminal does not pass. */
+void rl_one_line(char *text)
+{
+    for (unsigned char *c = (unsigned char *)text; *c; c++) {
+        if (*c == '\n' || *c == '\t')
+            *c = ' ';
+        else if (*c < ' ' || *c == 127)
+            *c = '?';
+    }
+}
+
 rl_code rl_vfail(rl_error *err, rl_code code, rl_where where, const char *fmt, va_list args)
 {
     if (!err)
@@ -21,6 +32,7 @@ rl_code rl_vfail(rl_error *err, rl_code code, rl_where where, const char *fmt, v
     err->column = where.column;
     copy_tail(err->file, sizeof err->file, where.file ? where.file : "");
     vsnprintf(err->text, sizeof err->text, fmt, args);
+    rl_one_line(err->text);
     return code;
 }
 

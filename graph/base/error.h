@@ -44,7 +44,7 @@ typedef struct rl_error {
     rl_code code;
     int line, column;
     char file[512];  /* "" when there is no place; longer paths lose their head, not their tail */
-    char text[1536]; /* one line, or a compiler's log; no "error:" in front */
+    char text[1536]; /* one line, without control characters; no "error:" in front */
 } rl_error;
 
 #if defined(__GNUC__)
@@ -66,6 +66,9 @@ rl_code rl_fail_memory(rl_error *err, unsigned long long bytes);
 
 /* "file:line:column: error: text", as users see it. Writes at most `size` bytes, always terminated. */
 void rl_error_format(const rl_error *err, char *out, unsigned long size);
+
+/* Control characters in place: line ends and tabs become spaces, the others '?'. */
+void rl_one_line(char *text);
 
 /* The code's meaning and its name ("RL_E_IO"). Static strings. */
 const char *rl_code_text(rl_code code);

@@ -11,5 +11,6 @@ void rl_report(const rl_log *log, rl_severity severity, rl_where where, const ch
     va_start(args, fmt);
     vsnprintf(text, sizeof text, fmt, args);
     va_end(args);
+    rl_one_line(text);
     log->sink(log->ctx, severity, where, text);
 }

@@ -244,19 +244,31 @@ static rl_code convert_image(rl_graph_builder *b, size_t first_added, const rl_w
             return RL_OK;
         }
     const bool plain = wanted->n_layers == 1 || !l->name || !*l->name;
-    const char *user = rl_arena_printf(b->arena, "output '%s'", wanted->name);
     const char *name =
         rl_arena_printf(b->arena, "output.%s%s%s", wanted->name, plain ? "" : ".", plain ? "" : l->name);
-    if (!user || !name)
+    if (!name)
         return rl_fail_memory(b->err, strlen(wanted->name) + 16);
-    rl_code code = rl_graph_check_format(b, user, &pass->ports.rows[read], *image, l->where);
-    if (code == RL_OK)
-        code = add_node(b, &(rl_node){.name = name, .pass = pass, .params = params});
+    if (b->images[*image].format != pass->ports.rows[read].format)
+        return rl_fail(
+            b->err, RL_E_CONFIG, l->where,
+            "output '%s': only %s images are colour-converted, '%s' is %s; leave out colorspace, display, "
+            "view, look and exposure",
+            wanted->name, rl_format_name(pass->ports.rows[read].format), b->images[*image].name,
+            rl_format_name(b->images[*image].format));
+    rl_code code = add_node(b, &(rl_node){.name = name, .pass = pass, .params = params});
     if (code != RL_OK)
         return code;
     b->bound[b->n_nodes - 1][read] = *image;
     *image = b->nodes[b->n_nodes - 1].images[write];
     return RL_OK;
+}
+
+/* Data beside colours in one file stays as it is: a conversion is of the colours. */
+static bool is_data_beside(const rl_graph_builder *b, const rl_wanted *wanted, size_t layer, int image)
+{
+    size_t read = 0, write = 0;
+    return wanted->n_layers > 1 && convert_ports(wanted->convert[layer], &read, &write) &&
+           b->images[image].format != wanted->convert[layer]->ports.rows[read].format;
 }
 
 static rl_code add_output(rl_graph_builder *b, size_t first_added, const rl_wanted *wanted,
@@ -270,7 +282,8 @@ static rl_code add_output(rl_graph_builder *b, size_t first_added, const rl_want
     rl_code code = RL_OK;
     for (size_t i = 0; i < wanted->n_layers && code == RL_OK; i++) {
         code = rl_graph_resolve(b, wanted->layers[i].image, wanted->layers[i].where, user, &images[i]);
-        if (code == RL_OK && wanted->convert && wanted->convert[i])
+        if (code == RL_OK && wanted->convert && wanted->convert[i] &&
+            !is_data_beside(b, wanted, i, images[i]))
             code = convert_image(b, first_added, wanted, i, &images[i]);
     }
     return code;

@@ -82,7 +82,7 @@ static rl_code read_texts(rl_manifest_reader *r, const rl_value *v)
     if (name && (!m->name[0] || strchr(m->name, '/')))
         return rl_fail(r->err, RL_E_CONFIG, name->where,
                        "'name' becomes part of file names: no '/', not empty");
-    if (!m->name && !(m->name = rl_manifest_stem(r->arena, m->patterns[0].path)))
+    if (!m->name && !(m->name = rl_manifest_stem(r->arena, m->n_patterns ? m->patterns[0].path : "memory")))
         return rl_fail_memory(r->err, 64);
     return RL_OK;
 }

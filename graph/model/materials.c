@@ -1,6 +1,7 @@
 /* The material table: its rows, and reading it. How it is filled from YAML is in materials_read.c. */
 #include "graph/model/materials.h"
 
+#include <stdlib.h>
 #include <string.h>
 
 /* ---- rows
@@ -40,7 +41,7 @@ rl_code rl_material_rows(rl_arena *arena, const rl_registry *registry, const rl_
                 if (has_row(rows, used, group_names[g], row->name))
                     continue;
                 rows[used++] = (rl_material_row){group_names[g], row, bytes};
-                bytes += RL_PARAM_BYTES(row->type);
+                bytes += rl_param_bytes(row);
             }
         }
     }
@@ -85,26 +86,52 @@ bool rl_material_has_profile(const struct rl_materials *m, size_t material)
     return material < m->count && m->profiles[material];
 }
 
+static void load(const rl_param *row, const char *at, double out[3])
+{
+    int32_t word;
+    memcpy(&word, at, sizeof word);
+    out[0] = word;
+    if (row->type != RL_F32 && row->type != RL_RGBF)
+        return;
+    for (size_t i = 0; i < RL_PARAM_BYTES(row->type) / sizeof(float); i++) {
+        float v;
+        memcpy(&v, at + i * sizeof v, sizeof v);
+        out[i] = (double)v;
+    }
+}
+
+/* `rest` is what follows the list's name: ".0.weight". */
+static bool load_element(const rl_param *row, const char *at, const char *rest, double out[3])
+{
+    double n[3];
+    load(row, at, n);
+    char *end;
+    unsigned long i = strtoul(rest + 1, &end, 10);
+    if (end == rest + 1 || *end != '.' || (double)i >= n[0])
+        return false;
+    for (size_t k = 0; k < row->list.n; k++) {
+        if (!strcmp(row->list.rows[k].name, end + 1)) {
+            load(&row->list.rows[k], rl_param_element(row, at, i, k), out);
+            return true;
+        }
+    }
+    return false;
+}
+
 bool rl_material_get(const struct rl_materials *m, size_t material, const char *group, const char *key,
                      double out[3])
 {
     const rl_material_row *row = NULL;
+    size_t length = strcspn(key, ".");
     for (size_t i = 0; i < m->n_rows && !row; i++)
-        if (!strcmp(m->rows[i].group, group) && !strcmp(m->rows[i].param->name, key))
+        if (!strcmp(m->rows[i].group, group) && !strncmp(m->rows[i].param->name, key, length) &&
+            !m->rows[i].param->name[length])
             row = &m->rows[i];
     if (!row || material >= m->count)
         return false;
     const char *at = (const char *)m->data + material * m->entry_bytes + row->offset;
-    if (row->param->type == RL_F32 || row->param->type == RL_RGBF) {
-        for (size_t i = 0; i < RL_PARAM_BYTES(row->param->type) / sizeof(float); i++) {
-            float v;
-            memcpy(&v, at + i * sizeof v, sizeof v);
-            out[i] = (double)v;
-        }
-    } else {
-        int32_t v;
-        memcpy(&v, at, sizeof v);
-        out[0] = v;
-    }
+    if (key[length])
+        return row->param->type == RL_ROWS && load_element(row->param, at, key + length, out);
+    load(row->param, at, out);
     return true;
 }

@@ -109,15 +109,32 @@ static void note_unread(const reader *r, const rl_value *profile, const char *na
     }
 }
 
+/* Whether the profile in `entry` has what makes the row required: "KEY=a|b". */
+static bool asks_for(const reader *r, const char *required_with, const char *entry)
+{
+    const char *words = required_with ? strchr(required_with, '=') : NULL;
+    for (size_t i = 0; words && i < r->m->n_rows; i++) {
+        const rl_material_row *row = &r->m->rows[i];
+        size_t n = (size_t)(words - required_with);
+        if (!strcmp(row->group, "profile") && !strncmp(row->param->name, required_with, n) &&
+            !row->param->name[n])
+            return rl_param_is(row->param, entry + row->offset, words + 1);
+    }
+    return false;
+}
+
 /* What the graph's passes cannot do without. */
-static rl_code check_required(reader *r, const rl_value *profile, const char *name, rl_where where)
+static rl_code check_required(reader *r, const rl_value *profile, const char *name, const char *entry,
+                              rl_where where)
 {
     for (size_t i = 0; i < r->n_used; i++) {
         for (size_t k = 0; k < r->used[i]->profile_keys.n; k++) {
             const rl_param *row = &r->used[i]->profile_keys.rows[k];
-            if (row->required && !rl_value_get(profile, row->name))
-                return rl_fail(r->err, RL_E_CONFIG, where, "profile '%s' needs '%s' for pass %s: %s", name,
-                               row->name, r->used[i]->name, row->help);
+            bool asked = asks_for(r, row->required_with, entry);
+            if ((row->required || asked) && !rl_value_get(profile, row->name))
+                return rl_fail(r->err, RL_E_CONFIG, where, "profile '%s' needs '%s' for pass %s%s%s%s: %s", name,
+                               row->name, r->used[i]->name, asked ? " (" : "",
+                               asked ? row->required_with : "", asked ? ")" : "", row->help);
         }
     }
     return RL_OK;
@@ -168,7 +185,7 @@ static rl_code read_profile(reader *r, unsigned dense, const rl_value *v)
     }
     rl_code code = read_group(r, profile, "profile", name, entry_at(r, dense));
     if (!code)
-        code = check_required(r, profile, name, where);
+        code = check_required(r, profile, name, entry_at(r, dense), where);
     if (code)
         return code;
     note_unread(r, profile, name);
@@ -194,6 +211,8 @@ static bool takes(const rl_param *row, rl_kind kind)
         return kind == RL_TRUTH;
     case RL_ENUM:
         return kind == RL_TEXT;
+    case RL_ROWS:
+        return kind == RL_LIST;
     }
     return false;
 }
@@ -261,7 +280,7 @@ rl_code rl_materials_resolve_from(const rl_registry *registry, rl_arena *arena, 
         .n_used = n_used,
         .log = log,
         .m = m,
-        .ids = {.arena = arena, .names = names, .n_names = n_names},
+        .ids = {.arena = arena, .log = log, .names = names, .n_names = n_names},
         .err = err
     };
     rl_code code = rl_material_rows(arena, registry, &m->rows, &m->n_rows, &m->entry_bytes, err);

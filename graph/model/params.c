@@ -1,4 +1,4 @@
-#include "graph/model/params.h"
+#include "graph/model/params_list.h"
 
 #include <float.h>
 #include <math.h>
@@ -31,10 +31,9 @@ static bool add_word(rl_str *s, const char *words, int index)
     return true;
 }
 
-/* The index of `text` among "a|b|c", or -1. */
-static int find_word(const char *words, const char *text)
+/* The index of the n characters of `text` among "a|b|c", or -1. */
+static int find_wordn(const char *words, const char *text, size_t n)
 {
-    size_t n = strlen(text);
     for (int i = 0; n && words; i++) {
         if (strcspn(words, "|") == n && !strncmp(words, text, n))
             return i;
@@ -42,6 +41,24 @@ static int find_word(const char *words, const char *text)
         words = words ? words + 1 : NULL;
     }
     return -1;
+}
+
+static int find_word(const char *words, const char *text)
+{
+    return find_wordn(words, text, strlen(text));
+}
+
+bool rl_param_is(const rl_param *row, const void *value, const char *words)
+{
+    int32_t v;
+    memcpy(&v, value, sizeof v);
+    while (words) {
+        if (find_wordn(row->words, words, strcspn(words, "|")) == v)
+            return true;
+        words = strchr(words, '|');
+        words = words ? words + 1 : NULL;
+    }
+    return false;
 }
 
 /* ---- ranges as text
@@ -94,9 +111,16 @@ static void store_float(void *out, size_t i, double value)
     memcpy((char *)out + i * sizeof v, &v, sizeof v);
 }
 
+size_t rl_param_bytes(const rl_param *row)
+{
+    return row->type == RL_ROWS ? rl_list_bytes(row) : RL_PARAM_BYTES(row->type);
+}
+
 void rl_param_default(const rl_param *row, void *out)
 {
-    if (row->type == RL_RGBF) {
+    if (row->type == RL_ROWS) {
+        memset(out, 0, rl_list_bytes(row));
+    } else if (row->type == RL_RGBF) {
         for (size_t i = 0; i < 3; i++)
             store_float(out, i, row->no_default ? -1 : row->def[i]);
     } else if (row->type == RL_F32) {
@@ -172,6 +196,9 @@ rl_code rl_param_read(const rl_param *row, const rl_value *v, void *out, rl_erro
         if (!code)
             store_int(out, word);
         break;
+    case RL_ROWS:
+        code = rl_list_read(row, v, out, err);
+        break;
     }
     return code;
 }
@@ -235,6 +262,16 @@ rl_code rl_params_read(rl_arena *arena, const rl_pass *pass, const char *node, c
     return RL_OK;
 }
 
+bool rl_step_runs(const rl_pass *pass, const rl_step *step, const void *params)
+{
+    const rl_param *row = step->when ? find_row(pass->params, step->when) : NULL;
+    int32_t v;
+    if (!row)
+        return true;
+    memcpy(&v, (const char *)params + row->offset, sizeof v);
+    return v == step->is;
+}
+
 /* ---- telling
  * ------------------------------------------------------------------------------------------------- */
 
@@ -269,6 +306,9 @@ void rl_param_print(const rl_param *row, const void *value, rl_str *s)
         if (v >= 0 || !add_word(s, row->words, -1 - v))
             rl_str_printf(s, "%d", (int)v);
         break;
+    case RL_ROWS:
+        rl_list_print(row, value, s);
+        break;
     }
 }
 
@@ -277,11 +317,13 @@ void rl_param_describe(const rl_param *row, rl_str *s)
     float value[3];
     const char *unit = row->unit && row->unit[0] ? row->unit : NULL;
     size_t before = s->length;
-    if (row->type == RL_BOOL)
+    if (row->type == RL_ROWS)
+        rl_list_expected(row, s);
+    else if (row->type == RL_BOOL)
         rl_str_add(s, "true|false");
     else if (row->words)
         rl_str_add(s, row->words);
-    if (row->type != RL_BOOL && row->type != RL_ENUM) {
+    if (row->type != RL_BOOL && row->type != RL_ENUM && row->type != RL_ROWS) {
         if (s->length > before)
             rl_str_add(s, "|");
         size_t words = s->length;
@@ -289,9 +331,11 @@ void rl_param_describe(const rl_param *row, rl_str *s)
         if (s->length == words)
             rl_str_add(s, row->type == RL_I32 ? "an integer" : "a number");
     }
-    if (row->no_default || row->required) {
+    if (row->no_default || row->required || row->type == RL_ROWS) {
         rl_str_printf(s, "%s%s, %s", unit ? " " : "", unit ? unit : "",
                       row->required ? "required" : "no default");
+        if (row->required_with)
+            rl_str_printf(s, ", required with %s", row->required_with);
         return;
     }
     rl_str_add(s, ", default ");
@@ -304,6 +348,10 @@ void rl_param_describe(const rl_param *row, rl_str *s)
 void rl_param_field(const rl_param *row, const char *prefix, rl_str *s)
 {
     bool real = row->type == RL_F32 || row->type == RL_RGBF;
+    if (row->type == RL_ROWS) {
+        rl_list_field(row, prefix, s);
+        return;
+    }
     rl_str_printf(s, "%s %s%s%s;", real ? "float" : "int", prefix, row->name,
                   row->type == RL_RGBF ? "[3]" : "");
 }

@@ -15,11 +15,15 @@ extern "C" {
 rl_code rl_fail_suggest(rl_error *err, rl_where where, const char *text, const char *name,
                         const char *const *known, size_t n);
 
-/* The default of a row, or -1 for .no_default rows, written to out (RL_PARAM_BYTES(row->type) bytes). */
+/* What a value of the row takes in a struct. */
+size_t rl_param_bytes(const rl_param *row);
+
+/* The default of a row, or -1 for .no_default rows, written to out (rl_param_bytes(row) bytes); lists are empty. */
 void rl_param_default(const rl_param *row, void *out);
 
 /* One value: type and range checked in double before narrowing, NaN refused, words known with did-you-mean.
- * `out` gets RL_PARAM_BYTES(row->type) bytes. */
+ * `out` gets rl_param_bytes(row) bytes. Lists: unknown keys, missing ones that are .required, and sums beyond
+ * .most_sum are errors. */
 rl_code rl_param_read(const rl_param *row, const rl_value *v, void *out, rl_error *err);
 
 /* A pass's struct (pass->params_size bytes in the arena): defaults, then what the node's map (may be NULL)
@@ -28,6 +32,15 @@ rl_code rl_param_read(const rl_param *row, const rl_value *v, void *out, rl_erro
 rl_code rl_params_read(rl_arena *arena, const rl_pass *pass, const char *node, const rl_value *map,
                        const char *const *also, size_t n_also, const void **out, rl_error *err);
 
+/* Where row `row->list.rows[k]` of element `i` is in the value of a list (i < row->max). */
+const void *rl_param_element(const rl_param *row, const void *value, size_t i, size_t k);
+
+/* Whether a value of an RL_ENUM row is one of the words "a|b". */
+bool rl_param_is(const rl_param *row, const void *value, const char *words);
+
+/* Whether a step of the pass runs with these parameters (the pass's struct; may be NULL when it has none). */
+bool rl_step_runs(const rl_pass *pass, const rl_step *step, const void *params);
+
 /* A value as YAML text ("auto", "screen", "0.05", "[1, 0, 0]"), appended to s. */
 void rl_param_print(const rl_param *row, const void *value, rl_str *s);
 /* The row's range and default for people: "0 … 1, default 0.05 ratio", "screen|tangent, default screen",
@@ -35,7 +48,7 @@ void rl_param_print(const rl_param *row, const void *value, rl_str *s);
 void rl_param_describe(const rl_param *row, rl_str *s);
 
 /* A row as a field of an OpenCL struct, "float blend;" or, with the prefix "profile_", "float
- * profile_weight[3];". */
+ * profile_weight[3];"; a list as its fields. */
 void rl_param_field(const rl_param *row, const char *prefix, rl_str *s);
 /* The OpenCL text of a struct with these rows, in order: "typedef struct params_t { float blend; } params_t;"
  * and a newline; nothing when there are no rows. */

@@ -9,6 +9,7 @@
  *     constant frame_t *       size, number, cameras            (kernels/shared.h)
  *     constant material_t *    one entry a dense stencil index  (generated: every registered pass's rows)
  *     constant light_t *       when .lights is set
+ *     constant ambient_t *     when .ambient is set
  *     constant float *         when .tables is set: what the host computed
  */
 #ifndef RL_MODEL_PASS_H
@@ -34,7 +35,16 @@ typedef enum rl_type {
     RL_BOOL, /* int32_t 0 or 1 */
     RL_ENUM, /* int32_t: index into words */
     RL_RGBF, /* float[3]; one number in YAML means three equal ones */
+    RL_ROWS, /* a list of min … max maps of further rows (.list): int32_t NAME_n, then for each of those rows an
+                array NAME_ROW[max], RGB rows [3 * max]; elements beyond NAME_n are 0 */
 } rl_type;
+
+struct rl_param;
+
+typedef struct rl_params {
+    const struct rl_param *rows;
+    size_t n;
+} rl_params;
 
 /* A row of a table of parameters, or of profile, material or shading keys. */
 typedef struct rl_param {
@@ -48,8 +58,12 @@ typedef struct rl_param {
     const char *help;    /* one line, lower case, no full stop */
     const char *source;  /* where the idea is from, or NULL */
     bool structural;     /* a #define P_NAME for the program, since the code itself depends on it */
-    bool required;       /* profile rows: every profile that a material uses must give it */
+    bool required;       /* profile rows: every profile that a material uses must give it, when a pass of the graph
+                            declares it so; rows of a list: every element must */
     bool no_default;     /* rows of the material table with min >= 0: the device sees -1 where it is not given */
+    const char *required_with; /* profile rows, "KEY=a|b": required of profiles whose KEY is one of the words */
+    rl_params list;      /* RL_ROWS: the keys of an element, none of them RL_ROWS */
+    double most_sum;     /* float rows of a list, > 0: what the elements add up to at most, each channel (+1e-6) */
 } rl_param;
 
 #define RL_ARRAY_LENGTH(a) (sizeof(a) / sizeof *(a))
@@ -71,13 +85,13 @@ typedef struct rl_param {
 #define M_ENUM(field, words_, def_, ...)                                                              \
     {.name = #field, .type = RL_ENUM, .min = 0, .max = 1e9, .def = {(def_), (def_), (def_)},                 \
      .words = (words_), .unit = "", .help = __VA_ARGS__}
+/* least_ … most_ maps whose keys are the array rows_. */
+#define M_ROWS(field, rows_, least_, most_, ...)                                                      \
+    {.name = #field, .type = RL_ROWS, .min = (least_), .max = (most_), .unit = "", .list = RL_ARRAY(rows_),  \
+     .help = __VA_ARGS__}
 
+/* Of all types but RL_ROWS: rl_param_bytes in params.h has those too. */
 #define RL_PARAM_BYTES(type) ((type) == RL_RGBF ? 12u : 4u)
-
-typedef struct rl_params {
-    const rl_param *rows;
-    size_t n;
-} rl_params;
 
 /* ---- ports --------------------------------------------------------------------------------------------- */
 
@@ -108,6 +122,8 @@ typedef struct rl_port {
     rl_format format;
     const char *help;
     bool optional;     /* READ: may be absent; the kernel sees NULL and HAS_NAME 0 */
+    const char *needed_by; /* optional READ: "diffuse: sg" is a shading key of this pass and a word of it; a material with a
+                              profile and that word makes the port required (graph.h); NULL = none does */
     const char *of;    /* HISTORY: the port (own output first, else own input) whose past this is */
     rl_layout layout;  /* the layout that the kernel wants; the plan inserts the conversion */
     bool any_layout;   /* WRITE: the kernel stores through RL_STORE, so the plan may choose (LAYOUT_NAME) */
@@ -124,6 +140,8 @@ typedef enum rl_domain {
 typedef struct rl_step {
     const char *entry; /* the kernel function; its arguments are those of the pass */
     rl_domain domain;
+    const char *when;  /* a structural parameter: the step runs only where it is .is; NULL = always */
+    int32_t is;
 } rl_step;
 
 /* ---- the pass ------------------------------------------------------------------------------------------ */
@@ -145,7 +163,7 @@ typedef struct rl_pass {
     const char *help;        /* one line */
     const char *source;      /* paper, talk, equation */
     const char *kernel;      /* file in kernels/, or NULL when kernel_text is set */
-    const char *kernel_prelude; /* another file in kernels/, put in front of it; NULL = none */
+    const char *kernel_prelude; /* other files in kernels/, put in front of it: "a.cl b.cl"; NULL = none */
     const char *kernel_text; /* the program itself, for passes built at run time; named kernel_file in errors */
     const char *kernel_file;
     rl_params params;
@@ -160,6 +178,7 @@ typedef struct rl_pass {
         size_t n;
     } steps;
     bool lights; /* the kernel gets the lights, and the run the shadow layers that they use */
+    bool ambient; /* the kernel gets the ambient light */
     /* Computes constant tables from parameters and materials, in double, into `arena`; NULL = none. Pure. */
     rl_code (*tables)(const rl_pass_input *in, rl_arena *arena, rl_tables *out, rl_error *err);
     const void *data; /* for .tables of a pass that is built at run time; the engine does not look at it */
@@ -175,7 +194,8 @@ typedef struct rl_pass {
 size_t rl_material_count(const struct rl_materials *m);
 bool rl_material_has_profile(const struct rl_materials *m, size_t material);
 /* The value of a row as every pass sees it: `group` is "profile", "material" or "shading". Writes 1 or 3
- * numbers to out (RGB rows 3); false when no registered pass declares such a row. */
+ * numbers to out (RGB rows 3); false when no registered pass declares such a row. A list's name gives its number of
+ * elements, "gaussians.0.weight" a value of one; false beyond the last. */
 bool rl_material_get(const struct rl_materials *m, size_t material, const char *group, const char *key,
                      double out[3]);
 

@@ -66,6 +66,7 @@ typedef struct rl_pipeline {
     rl_where color_where;
     const rl_value *profiles, *shading, *materials; /* maps or NULL, see materials.h */
     const rl_value *lights;                         /* map, or NULL: the capture's own */
+    const rl_value *ambient;                        /* map (ambient.h), or NULL */
     const rl_node *nodes;                           /* in the order of the file */
     size_t n_nodes;
     const rl_output *outputs;

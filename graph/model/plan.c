@@ -4,6 +4,7 @@
 #include <stdlib.h>
 
 #include "graph/model/graph_build.h"
+#include "graph/model/params.h"
 #include "graph/model/plan_build.h"
 
 /* ---- what runs, in which order ---------------------------------------------------------------------------
@@ -275,9 +276,12 @@ static rl_code make_steps(rl_planner *p)
         if (i == p->n_live)
             break;
         const rl_pass *pass = p->graph->nodes[p->order[i]].pass;
-        for (size_t s = 0; s < pass->steps.n; s++)
+        for (size_t s = 0; s < pass->steps.n; s++) {
+            if (!rl_step_runs(pass, &pass->steps.rows[s], p->graph->nodes[p->order[i]].params))
+                continue;
             p->steps[p->n_steps++] =
                 (rl_plan_step){RL_STEP_KERNEL, p->order[i], (int)s, p->nodes[i].buffers, (int)pass->ports.n};
+        }
     }
     return code == RL_OK ? add_copies(p) : code;
 }

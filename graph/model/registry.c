@@ -7,9 +7,11 @@
 #define RL_PASSES(X)                                                                                         \
     X(lighting)                                                                                              \
     X(sss_burley)                                                                                            \
+    X(sss_gaussian)                                                                                          \
     X(sss_reference)                                                                                         \
     X(combine)                                                                                               \
     X(geometric_normal)                                                                                      \
+    X(curvature)                                                                                             \
     X(taa)
 
 #define RL_DECLARE(name) extern const rl_pass rl_pass_##name;

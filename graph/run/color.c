@@ -105,7 +105,7 @@ static const rl_port ports[] = {
 };
 
 static const rl_step steps[] = {
-    {"color_apply", RL_EVERY_VECTOR}
+    {"color_apply", .domain = RL_EVERY_VECTOR}
 };
 
 static rl_code give_tables(const rl_pass_input *in, rl_arena *arena, rl_tables *out, rl_error *err)

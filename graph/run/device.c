@@ -64,9 +64,9 @@ struct rl_program {
 
 static atomic_ulong countdown;
 
-void rl_device_fail_at(unsigned long n)
+unsigned long rl_device_fail_at(unsigned long n)
 {
-    atomic_store(&countdown, n);
+    return atomic_exchange(&countdown, n);
 }
 
 static bool injected(void)
@@ -80,6 +80,13 @@ static bool injected(void)
 
 /* The call's status, or an injected failure without the call. */
 #define CL(call) (injected() ? CL_OUT_OF_RESOURCES : (call))
+
+/* The status of a wait. An injected failure comes behind the call: the device must not be at work on memory that the
+ * caller then frees. */
+static cl_int waited(cl_int status)
+{
+    return injected() ? CL_OUT_OF_RESOURCES : status;
+}
 
 static const char *status_text(cl_int status)
 {
@@ -211,16 +218,18 @@ static rl_code choose(const char *choice, const cl_device_id *ids, const rl_devi
 
 static rl_code open_queues(rl_device *d, rl_error *err)
 {
-    cl_int status = CL_SUCCESS;
+    cl_int status = CL_OUT_OF_RESOURCES;
     d->context = injected() ? NULL : clCreateContext(NULL, 1, &d->id, NULL, NULL, &status);
     if (!d->context)
         return fail_cl(err, status, "the context cannot be made");
+    status = CL_OUT_OF_RESOURCES;
     d->queue =
         injected() ? NULL : clCreateCommandQueue(d->context, d->id, CL_QUEUE_PROFILING_ENABLE, &status);
-    d->mapper = injected() ? NULL : clCreateCommandQueue(d->context, d->id, 0, &status);
-    if (!d->queue || !d->mapper)
+    if (!d->queue)
         return fail_cl(err, status, "the queue cannot be made");
-    return RL_OK;
+    status = CL_OUT_OF_RESOURCES;
+    d->mapper = injected() ? NULL : clCreateCommandQueue(d->context, d->id, 0, &status);
+    return d->mapper ? RL_OK : fail_cl(err, status, "the queue cannot be made");
 }
 
 rl_code rl_device_open(const char *choice, int threads, const rl_log *log, rl_device **out, rl_error *err)
@@ -375,7 +384,7 @@ rl_code rl_memory_unmap(rl_memory *memory, rl_error *err)
         CL(clEnqueueUnmapMemObject(memory->device->mapper, memory->mem, memory->mapped, 0, NULL, &done));
     memory->mapped = NULL;
     if (status == CL_SUCCESS)
-        status = CL(clWaitForEvents(1, &done));
+        status = waited(clWaitForEvents(1, &done));
     if (done)
         clReleaseEvent(done);
     return status == CL_SUCCESS ? RL_OK : fail_cl(err, status, "a buffer cannot be unmapped");
@@ -392,21 +401,55 @@ rl_code rl_memory_copy(rl_memory *to, rl_memory *from, rl_error *err)
 /* ---- programs --------------------------------------------------------------------------------------------
  */
 
-/* The first "place: error: text" of a compiler's log becomes the error's place and text. */
-static rl_code fail_build(rl_error *err, const char *name, char *log)
+/* Cuts a severity ("error: ") off the front of *text: 'e', 'w', or 0 where there is none. */
+static char cut_severity(const char **text)
 {
-    for (char *line = strtok(log, "\n"); line; line = strtok(NULL, "\n")) {
-        char file[256];
-        int at_line, column, used = 0;
-        if (sscanf(line, "%255[^:\n]:%d:%d: %n", file, &at_line, &column, &used) == 3 && used > 0) {
-            const char *text = line + used;
-            const char *head = strstr(text, "error: ");
-            if (head || strstr(text, "warning: "))
-                return rl_fail(err, RL_E_BUILD, (rl_where){file, at_line, column}, "%s",
-                               head ? head + 7 : text);
+    static const char *const words[] = {"error: ", "fatal error: ", "warning: "};
+    for (int i = 0; i < 3; i++) {
+        size_t n = strlen(words[i]);
+        if (!strncmp(*text, words[i], n)) {
+            *text += n;
+            return i < 2 ? 'e' : 'w';
         }
     }
-    return rl_fail(err, RL_E_BUILD, RL_NOWHERE, "OpenCL program '%s' does not build", name);
+    return 0;
+}
+
+/* A line of a compiler's log, "error: place: text" (PoCL) or "place: error: text" (clang): its severity, or 0. The
+ * place, "file:line:column", is split in `line` itself. */
+static char split_message(char *line, rl_where *where, const char **text)
+{
+    const char *start = line;
+    char severity = cut_severity(&start);
+    for (char *c = line + (start - line); *c; c++) {
+        int used = 0, at_line, column;
+        if (*c != ':' || sscanf(c, ":%d:%d: %n", &at_line, &column, &used) != 2 || !used)
+            continue;
+        *text = c + used;
+        *c = 0;
+        *where = (rl_where){start, at_line, column};
+        char inner = cut_severity(text);
+        return severity ? severity : inner;
+    }
+    return 0;
+}
+
+/* The first error of a compiler's log, or its first warning when there is none, becomes the error. */
+static rl_code fail_build(rl_error *err, const char *name, char *log)
+{
+    rl_where where, found = RL_NOWHERE;
+    const char *text, *what = NULL;
+    char severity = 0;
+    char *rest = NULL;
+    for (char *line = strtok_r(log, "\n", &rest); line && severity != 'e'; line = strtok_r(NULL, "\n", &rest)) {
+        char s = split_message(line, &where, &text);
+        if (!s || (s == 'w' && severity))
+            continue;
+        severity = s;
+        found = where;
+        what = text;
+    }
+    return rl_fail(err, RL_E_BUILD, found, what ? "%s" : "OpenCL program '%s' does not build", what ? what : name);
 }
 
 static rl_code build_log(rl_program *p, cl_int status, bool strict, rl_error *err)
@@ -594,7 +637,7 @@ rl_code rl_device_run(rl_device *device, rl_program *program, const rl_dispatch 
 
 rl_code rl_device_finish(rl_device *device, rl_error *err)
 {
-    cl_int status = CL(clFinish(device->queue));
+    cl_int status = waited(clFinish(device->queue));
     for (size_t i = device->n_spans; i-- > 0;) {
         read_span(device, device->spans[i].event, device->spans[i].out);
         clReleaseEvent(device->spans[i].event);

@@ -82,8 +82,9 @@ rl_code rl_device_run(rl_device *device, rl_program *program, const rl_dispatch 
 /* Waits until all that was enqueued is done. */
 rl_code rl_device_finish(rl_device *device, rl_error *err);
 
-/* For tests: the n-th OpenCL call from now fails with CL_OUT_OF_RESOURCES; 0 switches this off. */
-void rl_device_fail_at(unsigned long n);
+/* For tests: the n-th OpenCL call from now fails with CL_OUT_OF_RESOURCES; 0 switches this off. Returns how many were left
+ * of the n before, 0 when it has failed. */
+unsigned long rl_device_fail_at(unsigned long n);
 
 #ifdef __cplusplus
 }

@@ -23,7 +23,7 @@ struct rl_executor {
     const rl_log *log;
     node_state *nodes; /* [graph->n_nodes] */
     rl_program *convert;
-    rl_memory *materials, *frame, *lights;
+    rl_memory *materials, *frame, *lights, *ambient;
     rl_geometry geometry; /* columns 0: no size yet */
     rl_memory **slots;    /* [plan->n_slots] */
     rl_memory **history;  /* [plan->n_buffers][2]; NULL where the buffer is not HISTORY */
@@ -33,6 +33,7 @@ struct rl_executor {
 };
 
 struct rl_frame_buffers {
+    rl_geometry geometry;
     rl_memory **memory; /* [n] */
     size_t n;
 };
@@ -180,6 +181,7 @@ void rl_executor_free(rl_executor **executor)
     rl_memory_free(&x->materials);
     rl_memory_free(&x->frame);
     rl_memory_free(&x->lights);
+    rl_memory_free(&x->ambient);
     rl_arena_free(&x->arena);
     rl_free(x);
 }
@@ -221,6 +223,7 @@ rl_code rl_frame_buffers_new(rl_executor *x, const rl_geometry *geometry, rl_fra
     *out = f;
     if (!f)
         return rl_fail_memory(err, sizeof *f);
+    f->geometry = *geometry;
     f->n = x->plan->n_buffers;
     f->memory = rl_calloc(f->n + 1, sizeof *f->memory);
     rl_code code = f->memory ? RL_OK : rl_fail_memory(err, f->n * sizeof *f->memory);
@@ -244,6 +247,11 @@ void rl_frame_buffers_free(rl_frame_buffers **buffers)
         rl_memory_free(&f->memory[i]);
     rl_free(f->memory);
     rl_free(f);
+}
+
+const rl_geometry *rl_frame_buffers_geometry(const rl_frame_buffers *buffers)
+{
+    return &buffers->geometry;
 }
 
 rl_memory *rl_frame_buffers_memory(const rl_frame_buffers *buffers, int buffer)
@@ -299,7 +307,7 @@ static rl_code run_kernel(rl_executor *x, const rl_plan_step *s, const rl_frame_
     const rl_step *step = &pass->steps.rows[s->step];
     rl_memory *args[MOST_ARGUMENTS];
     size_t k = 0;
-    if (pass->ports.n + 5 > MOST_ARGUMENTS)
+    if (pass->ports.n + 6 > MOST_ARGUMENTS)
         return rl_fail(err, RL_E_CONFIG, g->where, "pass '%s' (%s) has too many ports (%zu)", g->name,
                        pass->name, pass->ports.n);
     for (size_t i = 0; i < pass->ports.n; i++)
@@ -310,6 +318,8 @@ static rl_code run_kernel(rl_executor *x, const rl_plan_step *s, const rl_frame_
     args[k++] = x->materials;
     if (pass->lights)
         args[k++] = x->lights;
+    if (pass->ambient)
+        args[k++] = x->ambient;
     if (pass->tables)
         args[k++] = n->tables;
     rl_dispatch d;
@@ -370,6 +380,9 @@ static rl_code upload_frame(rl_executor *x, const rl_frame_values *v, rl_error *
     rl_code code = upload(x, &f, sizeof f, &x->frame, err);
     if (!code)
         code = upload(x, v->lights, (size_t)v->n_lights * sizeof *v->lights, &x->lights, err);
+    const ambient_t none = {0};
+    if (!code)
+        code = upload(x, v->ambient ? v->ambient : &none, sizeof none, &x->ambient, err);
     return code;
 }
 

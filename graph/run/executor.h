@@ -31,6 +31,8 @@ const rl_geometry *rl_executor_geometry(const rl_executor *executor);
 rl_code rl_frame_buffers_new(rl_executor *executor, const rl_geometry *geometry, rl_frame_buffers **out,
                              rl_error *err);
 void rl_frame_buffers_free(rl_frame_buffers **buffers);
+/* The geometry that they were made for. */
+const rl_geometry *rl_frame_buffers_geometry(const rl_frame_buffers *buffers);
 /* The memory of a SOURCE or SINK buffer of the plan; NULL for others. */
 rl_memory *rl_frame_buffers_memory(const rl_frame_buffers *buffers, int buffer);
 
@@ -41,6 +43,7 @@ typedef struct rl_frame_values {
     camera_t camera;
     const light_t *lights;
     int n_lights; /* at most what it was for the first frame, or any number for it */
+    const ambient_t *ambient; /* NULL = none */
 } rl_frame_values;
 
 /* Runs all steps and waits for them; then history swaps. On an error history is empty afterwards. `spans` may

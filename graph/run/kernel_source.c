@@ -33,6 +33,18 @@ const char *rl_kernel_file(rl_arena *arena, const char *name)
     return NULL;
 }
 
+/* A path is whatever the user's folders are called. */
+static void add_line(const char *name, rl_str *out)
+{
+    rl_str_add(out, "#line 1 \"");
+    for (const char *c = name; *c; c++) {
+        if (*c == '"' || *c == '\\')
+            rl_str_add(out, "\\");
+        rl_str_addn(out, (unsigned char)*c < ' ' ? "?" : c, 1);
+    }
+    rl_str_add(out, "\"\n");
+}
+
 static rl_code add_file(rl_arena *arena, const char *name, rl_str *out, rl_error *err)
 {
     const char *text = rl_kernel_file(arena, name);
@@ -42,6 +54,19 @@ static rl_code add_file(rl_arena *arena, const char *name, rl_str *out, rl_error
     rl_str_add(out, text);
     rl_str_add(out, "\n");
     return RL_OK;
+}
+
+/* Names separated by spaces. */
+static rl_code add_files(rl_arena *arena, const char *names, rl_str *out, rl_error *err)
+{
+    rl_code code = RL_OK;
+    while (names && *names && !code) {
+        size_t n = strcspn(names, " ");
+        const char *name = rl_arena_strndup(arena, names, n);
+        code = name ? add_file(arena, name, out, err) : rl_fail_memory(err, n);
+        names += n + strspn(names + n, " ");
+    }
+    return code;
 }
 
 static rl_code add_shared(rl_arena *arena, rl_str *out, rl_error *err)
@@ -92,15 +117,16 @@ rl_code rl_kernel_text(rl_arena *arena, const rl_plan *plan, const rl_plan_node 
     rl_code code = add_shared(arena, out, err);
     if (code)
         return code;
-    if (pass->kernel_prelude)
-        code = add_file(arena, pass->kernel_prelude, out, err);
+    code = add_files(arena, pass->kernel_prelude, out, err);
     if (code)
         return code;
-    if (pass->kernel_text)
-        rl_str_printf(out, "#line 1 \"%s\"\n%s\n", pass->kernel_file ? pass->kernel_file : n->name,
-                      pass->kernel_text);
-    else
+    if (pass->kernel_text) {
+        add_line(pass->kernel_file ? pass->kernel_file : n->name, out);
+        rl_str_add(out, pass->kernel_text);
+        rl_str_add(out, "\n");
+    } else {
         code = add_file(arena, pass->kernel, out, err);
+    }
     if (!code && out->failed)
         code = rl_fail_memory(err, out->length);
     return code;

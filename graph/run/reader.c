@@ -271,6 +271,11 @@ rl_code rl_reader_open(rl_reader *r, int file_number, rl_frame *f, rl_error *err
     return code;
 }
 
+bool rl_reader_missed(rl_code code)
+{
+    return code == RL_E_IO || code == RL_E_FORMAT;
+}
+
 /* ---- pixels ---------------------------------------------------------------------------------------------- */
 
 static rl_code map_planes(rl_reader *r, rl_frame *f, rl_frame_maps *maps, rl_error *err)

@@ -66,6 +66,9 @@ void rl_reader_free(rl_reader **reader);
 /* Opens the files of frame `file_number` and reads headers: fills windows, geometry and camera, no pixel. */
 rl_code rl_reader_open(rl_reader *reader, int file_number, rl_frame *frame, rl_error *err);
 
+/* Errors that say that a frame's files are missing or broken, which --on-missing is about. */
+bool rl_reader_missed(rl_code code);
+
 /* Reads the pixels of an opened frame into frame->buffers (made by the caller for frame->geometry). */
 rl_code rl_reader_pixels(rl_reader *reader, rl_frame *frame, rl_pool *pool, rl_error *err);
 

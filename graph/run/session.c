@@ -41,33 +41,6 @@ static rl_code read_pipeline(rl_session *s, rl_error *err)
     return code ? code : rl_pipeline_parse(&s->arena, o->pipeline ? o->pipeline : "pipeline", root, s->log, &s->pipeline, err);
 }
 
-/* Frames and captures that expand to one file would overwrite each other. Names differ by capture and number only, so it is
- * enough to compare the first frames of all captures and two frames of each. */
-static rl_code check_files(rl_session *s, rl_error *err)
-{
-    for (size_t i = 0; i < s->n_outputs; i++) {
-        const rl_output *o = s->outputs[i].spec;
-        for (size_t a = 0; a < s->n_sequences; a++) {
-            const rl_sequence *q = &s->sequences[a];
-            const char *first = NULL, *second = NULL;
-            rl_code code = rl_output_path(&s->arena, o, q->manifest->name, q->frames.numbers[0], NULL, &first, err);
-            if (!code && q->frames.n > 1)
-                code = rl_output_path(&s->arena, o, q->manifest->name, q->frames.numbers[1], NULL, &second, err);
-            if (code)
-                return code;
-            if (second && !strcmp(first, second))
-                return rl_fail(err, RL_E_CONFIG, o->file_where,
-                               "output '%s': all frames would be written to '%s'; put {frame:04} into 'file'", o->name, first);
-            for (size_t b = 0; b < a; b++)
-                if (!strcmp(s->sequences[b].manifest->name, q->manifest->name))
-                    return rl_fail(err, RL_E_CONFIG, q->manifest->where,
-                                   "two captures are named '%s' and would write the same files; give one another 'name'",
-                                   q->manifest->name);
-        }
-    }
-    return RL_OK;
-}
-
 static rl_code check_memory(rl_session *s, rl_error *err)
 {
     for (size_t i = 0; i < s->n_sequences; i++) {
@@ -104,9 +77,11 @@ rl_code rl_session_open(const rl_options *options, rl_session **out, rl_error *e
     if (!code)
         code = rl_session_colors(s, err);
     if (!code)
+        code = rl_session_ambient(s, err);
+    if (!code)
         code = rl_session_sequences(s, err);
     if (!code)
-        code = check_files(s, err);
+        code = rl_session_paths(s, err);
     if (!code)
         code = check_memory(s, err);
     if (code)
@@ -158,7 +133,7 @@ size_t rl_session_frames(const rl_session *s, size_t capture)
 
 long long rl_session_frame(const rl_session *s, size_t capture, size_t i)
 {
-    return s->sequences[capture].frames.numbers[i];
+    return i < rl_session_frames(s, capture) ? s->sequences[capture].frames.numbers[i] : 0;
 }
 
 rl_code rl_session_plan(const rl_session *s, size_t capture, rl_plan_format format, char **text, rl_error *err)

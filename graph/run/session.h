@@ -50,6 +50,7 @@ struct rl_session {
     const rl_pipeline *pipeline;
     rl_ocio *ocio;
     const char *working;
+    ambient_t ambient; /* in the working space */
     rl_pool *pool;
     rl_device *device;
     rl_sink_output *outputs; /* the pipeline's that are wanted, then one for each dump */
@@ -73,9 +74,15 @@ rl_code rl_session_light_matrix(const rl_session *session, const char *space, rl
 rl_code rl_session_lights(rl_session *session, rl_sequence *sequence, rl_error *err);
 void rl_session_light_values(const rl_sequence *sequence, const camera_t *camera, light_t *out);
 
+/* session_ambient.c: the pipeline's ambient light; reads its HDRI. */
+rl_code rl_session_ambient(rl_session *session, rl_error *err);
+
 /* session_capture.c: manifests, frames, materials, graph and plan of every capture. */
 rl_code rl_session_sequences(rl_session *session, rl_error *err);
 void rl_sequence_close(rl_sequence *sequence);
+
+/* session_paths.c: no two outputs, captures or frames write one file. */
+rl_code rl_session_paths(rl_session *session, rl_error *err);
 
 /* session_run.c: runs the kernels on a loaded frame. `cut`: history does not reach here. */
 rl_code rl_session_execute(rl_session *session, rl_sequence *sequence, rl_frame *frame, bool cut, rl_error *err);

@@ -1,6 +1,7 @@
 /* The captures of a session: manifest, frames, lights, materials, graph, plan. */
 #include <stdio.h>
 #include <string.h>
+#include <strings.h>
 
 #include "graph/base/alloc.h"
 #include "graph/base/file.h"
@@ -63,6 +64,8 @@ static rl_code find_preset(rl_session *s, const char *files, const char *presets
 
 static rl_code load_manifest(rl_session *s, const char *path, rl_sequence *q, rl_error *err)
 {
+    if (!path)
+        return rl_fail_memory(err, 1);
     const char *presets = rl_data_path(&s->arena, "presets");
     if (rl_path_is_folder(path) || is_yaml(path))
         return rl_manifest_load(&s->arena, path, presets, s->log, &q->manifest, err);
@@ -71,14 +74,14 @@ static rl_code load_manifest(rl_session *s, const char *path, rl_sequence *q, rl
     return code ? code : rl_manifest_bare(&s->arena, path, preset, presets, s->log, &q->manifest, err);
 }
 
-/* Chooses among a preset's alternatives by what the first frame's files hold. */
-static rl_code bind_manifest(rl_session *s, rl_sequence *q, rl_error *err)
+/* Chooses among a preset's alternatives by what one frame's files hold. */
+static rl_code bind_frame(rl_session *s, rl_sequence *q, int frame, rl_error *err)
 {
     rl_manifest *m = q->manifest;
     rl_code code = RL_OK;
-    for (int p = 0; p < m->n_patterns && m->preset && !code; p++) {
+    for (int p = 0; p < m->n_patterns && !code; p++) {
         const rl_layer fake = {.pattern = p};
-        char *path = rl_manifest_path(&s->arena, m, &fake, q->frames.numbers[0]);
+        char *path = rl_manifest_path(&s->arena, m, &fake, frame);
         rl_exr *file = NULL;
         rl_channel *channels = NULL;
         size_t n = 0;
@@ -90,6 +93,25 @@ static rl_code bind_manifest(rl_session *s, rl_sequence *q, rl_error *err)
         rl_exr_close(&file);
     }
     return code;
+}
+
+/* By the first frame whose files are there: a frame that is missing is that frame's own error later on. */
+static rl_code bind_manifest(rl_session *s, rl_sequence *q, rl_error *err)
+{
+    rl_error first = {0};
+    if (!q->manifest->preset)
+        return RL_OK;
+    for (size_t i = 0; i < q->frames.n; i++) {
+        rl_error one = {0};
+        rl_code code = bind_frame(s, q, q->frames.numbers[i], &one);
+        if (!rl_reader_missed(code)) {
+            *err = code ? one : *err;
+            return code;
+        }
+        first = first.code ? first : one;
+    }
+    *err = first;
+    return first.code;
 }
 
 static rl_code choose_frames(rl_session *s, rl_sequence *q, rl_error *err)
@@ -144,6 +166,22 @@ static rl_code list_layers(rl_session *s, const rl_sequence *q, rl_layer_info **
     return RL_OK;
 }
 
+/* Image files other than EXR hold grey or colours. */
+static rl_code check_formats(const rl_session *s, const rl_graph *graph, rl_error *err)
+{
+    for (size_t i = 0; i < s->n_outputs; i++) {
+        const rl_output *o = s->outputs[i].spec;
+        const rl_image *image = &graph->images[graph->outputs[i].images[0]];
+        bool many = image->planes > 3 || image->planes == 2;
+        if (strcasecmp(rl_path_extension(o->file), ".exr") && (image->format == RL_ID || many))
+            return rl_fail(err, RL_E_CONFIG, o->file_where,
+                           "output '%s': a %s file cannot hold '%s' (%s, %d plane%s); write .exr", o->name,
+                           rl_path_extension(o->file), image->name, rl_format_name(image->format), image->planes,
+                           image->planes == 1 ? "" : "s");
+    }
+    return RL_OK;
+}
+
 static rl_code make_plan(rl_session *s, rl_sequence *q, rl_error *err)
 {
     rl_layer_info *layers = NULL;
@@ -152,6 +190,10 @@ static rl_code make_plan(rl_session *s, rl_sequence *q, rl_error *err)
     if (!code)
         code = rl_graph_build(&s->arena, s->pipeline->nodes, s->pipeline->n_nodes, layers, n, s->wanted,
                               s->n_outputs + 1, &q->graph, err);
+    if (!code)
+        code = check_formats(s, q->graph, err);
+    if (!code)
+        code = rl_graph_check_needs(&s->arena, q->graph, q->materials, err);
     return code ? code : rl_plan_make(&s->arena, q->graph, &q->plan, err);
 }
 
@@ -162,6 +204,26 @@ static bool wants_ids(const rl_session *s)
             if (!strcmp(s->wanted[i].layers[k].image, "capture.stencil"))
                 return true;
     return false;
+}
+
+/* The size of the first frame that can be opened; when none can, the error of the first. */
+static rl_code measure(rl_sequence *q, rl_error *err)
+{
+    rl_error first = {0};
+    for (size_t i = 0; i < q->frames.n; i++) {
+        rl_frame f = {.number = q->frames.numbers[i]};
+        rl_error one = {0};
+        rl_code code = rl_reader_open(q->reader, f.number, &f, &one);
+        q->geometry = f.geometry;
+        rl_frame_free(&f);
+        if (!rl_reader_missed(code)) {
+            *err = code ? one : *err;
+            return code;
+        }
+        first = first.code ? first : one;
+    }
+    *err = first;
+    return first.code;
 }
 
 static rl_code make_reader(rl_session *s, rl_sequence *q, rl_error *err)
@@ -177,13 +239,7 @@ static rl_code make_reader(rl_session *s, rl_sequence *q, rl_error *err)
                              .limit = s->options.memory_limit,
                              .log = s->log};
     rl_code code = rl_reader_new(&setup, &q->reader, err);
-    if (code || q->manifest->n_patterns == 0)
-        return code;
-    rl_frame first = {.number = q->frames.numbers[0]};
-    code = rl_reader_open(q->reader, q->frames.numbers[0], &first, err);
-    q->geometry = first.geometry;
-    rl_frame_free(&first);
-    return code;
+    return code || q->manifest->n_patterns == 0 ? code : measure(q, err);
 }
 
 static rl_code open_sequence(rl_session *s, rl_sequence *q, rl_error *err)

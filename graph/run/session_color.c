@@ -43,6 +43,8 @@ static rl_code make_output(rl_session *s, const rl_output *spec, rl_sink_output 
         request.display = spec->display;
         request.view = view;
         out->space = code ? NULL : rl_arena_printf(&s->arena, "%s / %s", spec->display, view);
+        if (!code && !out->space)
+            code = rl_fail_memory(err, strlen(view));
     } else {
         if (spec->colorspace)
             code = rl_color_space(s->ocio, spec->colorspace, spec->color_where, &target, err);

@@ -1,4 +1,5 @@
 /* Frames through a session: in batches from files to files, or one at a time. */
+#include <limits.h>
 #include <string.h>
 #include <time.h>
 
@@ -8,7 +9,7 @@
 #include "graph/run/camera.h"
 #include "graph/run/session.h"
 
-enum { MOST_IN_FLIGHT = 3, MOST_OUTPUT_FILES = 64 };
+enum { MOST_IN_FLIGHT = 3 };
 
 static double now_s(void)
 {
@@ -18,9 +19,9 @@ static double now_s(void)
 }
 
 /* Buffers follow the size of the frame that they hold. */
-static rl_code fit_buffers(rl_sequence *q, rl_frame *f, const rl_geometry *before, rl_error *err)
+static rl_code fit_buffers(rl_sequence *q, rl_frame *f, rl_error *err)
 {
-    if (f->buffers && !memcmp(before, &f->geometry, sizeof *before))
+    if (f->buffers && !memcmp(rl_frame_buffers_geometry(f->buffers), &f->geometry, sizeof f->geometry))
         return RL_OK;
     rl_frame_buffers_free(&f->buffers);
     return rl_frame_buffers_new(q->executor, &f->geometry, &f->buffers, err);
@@ -28,7 +29,6 @@ static rl_code fit_buffers(rl_sequence *q, rl_frame *f, const rl_geometry *befor
 
 rl_code rl_session_execute(rl_session *s, rl_sequence *q, rl_frame *f, bool cut, rl_error *err)
 {
-    (void)s;
     rl_code code = rl_executor_resize(q->executor, &f->geometry, err);
     if (code)
         return code;
@@ -36,7 +36,8 @@ rl_code rl_session_execute(rl_session *s, rl_sequence *q, rl_frame *f, bool cut,
         rl_executor_cut(q->executor);
     rl_session_light_values(q, &f->camera, q->light_values);
     rl_frame_values values = {
-        .number = f->number, .camera = f->camera, .lights = q->light_values, .n_lights = (int)q->n_lights};
+        .number = f->number, .camera = f->camera, .lights = q->light_values, .n_lights = (int)q->n_lights,
+        .ambient = &s->ambient};
     return rl_executor_run(q->executor, f->buffers, &values, NULL, err);
 }
 
@@ -58,44 +59,44 @@ rl_code rl_session_map_image(const rl_sequence *q, const rl_frame *f, int buffer
     out->planes = b->planes;
     out->format = b->image >= 0 ? q->graph->images[b->image].format : RL_SCALAR;
     out->stride = (size_t)g->stride;
-    const float *base =
+    out->plane = (size_t)g->plane;
+    out->pixels =
         (const float *)p + RL_GUARD + (size_t)(g->y - g->origin_y) * (size_t)g->stride + (size_t)(g->x - g->origin_x);
-    for (int i = 0; i < b->planes && i < 16; i++)
-        out->plane[i] = base + (size_t)i * (size_t)g->plane;
     return RL_OK;
 }
 
 typedef struct writing {
-    rl_sink_image images[MOST_OUTPUT_FILES];
-    rl_memory *memory[MOST_OUTPUT_FILES];
-    size_t n;
+    rl_sink_image *images;
+    rl_memory **memory; /* mapped, or NULL */
 } writing;
 
 /* The stencil goes out as the ids of the capture, not as dense indices. */
-static void restore_ids(const rl_frame *f, const rl_wanted *w, size_t layer, rl_sink_image *image)
+static void restore_ids(const rl_frame *f, const char *name, rl_sink_image *image)
 {
-    if (strcmp(w->layers[layer].image, "capture.stencil") || !f->ids)
+    if (strcmp(name, "capture.stencil") || !f->ids)
         return;
-    image->plane[0] = (const float *)(const void *)f->ids;
+    image->pixels = (const float *)(const void *)f->ids;
     image->stride = (size_t)f->geometry.width;
 }
 
 static rl_code write_output(rl_session *s, rl_sequence *q, rl_frame *f, size_t output, const rl_sink_frame *frame,
-                            const char *path, rl_error *err)
+                            const char *path, rl_arena *arena, rl_error *err)
 {
     const rl_wanted *w = &s->wanted[output];
-    writing wr = {0};
+    writing wr = {.images = rl_arena_array(arena, w->n_layers, sizeof *wr.images),
+                  .memory = rl_arena_array(arena, w->n_layers, sizeof(rl_memory *))};
+    if (!wr.images || !wr.memory)
+        return rl_fail_memory(err, w->n_layers * sizeof *wr.images);
     rl_code code = RL_OK;
-    for (size_t i = 0; i < w->n_layers && i < MOST_OUTPUT_FILES && !code; i++) {
+    for (size_t i = 0; i < w->n_layers && !code; i++) {
         code = rl_session_map_image(q, f, q->plan->outputs[output][i], &wr.images[i], &wr.memory[i], err);
         wr.images[i].name = w->layers[i].name;
         if (!code)
-            restore_ids(f, w, i, &wr.images[i]);
-        wr.n = i + 1;
+            restore_ids(f, w->layers[i].image, &wr.images[i]);
     }
     if (!code)
-        code = rl_sink_write(path, &s->outputs[output], wr.images, wr.n, frame, s->pool, &f->clipped, err);
-    for (size_t i = 0; i < wr.n; i++) {
+        code = rl_sink_write(path, &s->outputs[output], wr.images, w->n_layers, frame, s->pool, &f->clipped, err);
+    for (size_t i = 0; i < w->n_layers; i++) {
         rl_code unmapped = wr.memory[i] ? rl_memory_unmap(wr.memory[i], code ? NULL : err) : RL_OK;
         code = code ? code : unmapped;
     }
@@ -105,18 +106,21 @@ static rl_code write_output(rl_session *s, rl_sequence *q, rl_frame *f, size_t o
 static rl_code write_frame(rl_session *s, rl_sequence *q, rl_frame *f, rl_arena *arena, const char **files,
                            size_t *n_files, rl_error *err)
 {
+    const char *pipeline = rl_arena_printf(arena, "%s %016llx", s->pipeline->name, s->pipeline->hash);
+    if (!pipeline || !files)
+        return rl_fail_memory(err, s->n_outputs * sizeof *files);
     rl_sink_image stencil = {0};
     rl_memory *memory = NULL;
     rl_code code = rl_session_map_image(q, f, q->plan->outputs[s->n_outputs][1], &stencil, &memory, err);
     rl_sink_frame frame = {.data_window = f->data_window,
                            .display_window = f->display_window,
                            .crop = s->options.crop[2] > 0 ? s->options.crop : NULL,
-                           .stencil = (const uint32_t *)(const void *)stencil.plane[0],
+                           .stencil = (const uint32_t *)(const void *)stencil.pixels,
                            .stencil_stride = stencil.stride,
                            .source = f->files[f->main_file],
                            .source_part = f->main_part,
                            .fps = q->manifest->fps,
-                           .pipeline = rl_arena_printf(arena, "%s %016llx", s->pipeline->name, s->pipeline->hash)};
+                           .pipeline = pipeline};
     for (size_t i = 0; i < s->n_outputs && !code; i++) {
         const char *name = NULL;
         code = rl_output_path(arena, s->outputs[i].spec, q->manifest->name, f->number, NULL, &name, err);
@@ -124,8 +128,8 @@ static rl_code write_frame(rl_session *s, rl_sequence *q, rl_frame *f, rl_arena 
         if (!code && !path)
             code = rl_fail_memory(err, 1);
         if (!code)
-            code = write_output(s, q, f, i, &frame, path, err);
-        if (!code && *n_files < MOST_OUTPUT_FILES)
+            code = write_output(s, q, f, i, &frame, path, arena, err);
+        if (!code)
             files[(*n_files)++] = path;
     }
     if (memory)
@@ -139,7 +143,9 @@ typedef struct batch_state {
     rl_session *s;
     rl_sequence *q;
     rl_frame frames[MOST_IN_FLIGHT];
-    bool skipped[MOST_IN_FLIGHT];
+    bool skipped[MOST_IN_FLIGHT], held[MOST_IN_FLIGHT];
+    bool has_good; /* the loader's: a frame was read, `good`; it is what --on-missing hold shows */
+    int good;
     const rl_run_hooks *hooks;
     rl_run_summary *summary;
     size_t done_before, total;
@@ -148,23 +154,52 @@ typedef struct batch_state {
     camera_t camera;
 } batch_state;
 
+/* The frame of a number, under the files of another one when that is held. */
+static rl_code load_frame(batch_state *b, rl_frame *f, int file_number, rl_error *err)
+{
+    f->nonfinite = f->clamped = 0;
+    rl_code code = rl_reader_open(b->q->reader, file_number, f, err);
+    if (!code)
+        code = fit_buffers(b->q, f, err);
+    return code ? code : rl_reader_pixels(b->q->reader, f, b->s->pool, err);
+}
+
+/* A frame whose files are missing or broken: what --on-missing says. */
+static void miss_frame(batch_state *b, rl_frame *f, int slot)
+{
+    rl_on_missing how = b->s->options.on_missing;
+    rl_error why = f->error;
+    rl_where where = {.file = why.file};
+    if (how == RL_MISSING_SKIP) {
+        rl_report(b->s->log, RL_WARNING, where, "frame %d is skipped: %s", f->number, why.text);
+        b->skipped[slot] = true;
+    } else if (how == RL_MISSING_HOLD && b->has_good) {
+        rl_report(b->s->log, RL_WARNING, where, "frame %d holds the layers of frame %d: %s", f->number, b->good, why.text);
+        f->error = (rl_error){0};
+        b->held[slot] = true;
+        load_frame(b, f, b->good, &f->error);
+    } else if (how == RL_MISSING_HOLD) {
+        f->error = (rl_error){0};
+        rl_fail(&f->error, why.code, where, "%s (there is no frame before it to hold)", why.text);
+    }
+}
+
 static void batch_load(void *ctx, size_t item, int slot)
 {
     batch_state *b = ctx;
     rl_frame *f = &b->frames[slot];
-    rl_geometry before = f->geometry;
     double start = now_s();
     f->number = b->q->frames.numbers[item];
     f->error = (rl_error){0};
     f->run_s = f->write_s = 0;
-    f->clipped = 0;
-    b->skipped[slot] = false;
-    if (!rl_reader_open(b->q->reader, f->number, f, &f->error) && !fit_buffers(b->q, f, &before, &f->error))
-        rl_reader_pixels(b->q->reader, f, b->s->pool, &f->error);
-    if (f->error.code == RL_E_IO && b->s->options.on_missing == RL_MISSING_SKIP) {
-        rl_report(b->s->log, RL_WARNING, (rl_where){.file = f->error.file}, "frame %d is skipped: %s", f->number,
-                  f->error.text);
-        b->skipped[slot] = true;
+    f->nonfinite = f->clamped = f->clipped = 0;
+    b->skipped[slot] = b->held[slot] = false;
+    load_frame(b, f, f->number, &f->error);
+    if (rl_reader_missed(f->error.code)) {
+        miss_frame(b, f, slot);
+    } else if (!f->error.code) {
+        b->has_good = true;
+        b->good = f->number;
     }
     f->load_s = now_s() - start;
 }
@@ -185,10 +220,10 @@ static void batch_run(void *ctx, size_t item, int slot)
     batch_state *b = ctx;
     rl_frame *f = &b->frames[slot];
     double start = now_s();
-    bool cut = f->error.code || is_cut(b, f);
+    bool cut = f->error.code || b->held[slot] || is_cut(b, f);
     if (!f->error.code)
         rl_session_execute(b->s, b->q, f, cut, &f->error);
-    b->history = !f->error.code;
+    b->history = !f->error.code && !b->held[slot]; /* a held frame is no past of the next one */
     b->previous = f->number;
     b->camera = f->camera;
     f->run_s = now_s() - start;
@@ -199,7 +234,7 @@ static void batch_write(void *ctx, size_t item, int slot)
     batch_state *b = ctx;
     rl_frame *f = &b->frames[slot];
     rl_arena arena = {0};
-    const char *files[MOST_OUTPUT_FILES];
+    const char **files = rl_arena_array(&arena, b->s->n_outputs, sizeof *files);
     size_t n_files = 0;
     double start = now_s();
     if (!f->error.code)
@@ -312,6 +347,8 @@ rl_code rl_session_process(rl_session *s, size_t capture, long long number, cons
     s->processed = false;
     if (capture >= s->n_sequences)
         return rl_fail(err, RL_E_USAGE, RL_NOWHERE, "there is no capture %zu", capture);
+    if (number < INT_MIN || number > INT_MAX)
+        return rl_fail(err, RL_E_USAGE, RL_NOWHERE, "frame %lld is not within %d … %d", number, INT_MIN, INT_MAX);
     rl_sequence *q = &s->sequences[capture];
     rl_code code = rl_session_prepare(s, err);
     if (code)
@@ -319,12 +356,11 @@ rl_code rl_session_process(rl_session *s, size_t capture, long long number, cons
     rl_frame *f = &s->frame;
     if (s->frame_sequence != q)
         rl_frame_free(f);
-    rl_geometry before = f->geometry;
     s->frame_sequence = q;
     f->number = (int)number;
     code = data ? rl_reader_memory(q->reader, data, f, err) : rl_reader_open(q->reader, f->number, f, err);
     if (!code)
-        code = fit_buffers(q, f, &before, err);
+        code = fit_buffers(q, f, err);
     if (!code)
         code = data ? rl_reader_memory_pixels(q->reader, data, f, s->pool, err) : rl_reader_pixels(q->reader, f, s->pool, err);
     if (!code)
@@ -360,14 +396,17 @@ rl_code rl_session_image(rl_session *s, const char *image, rl_image_view *out, r
     rl_code code = rl_session_map_image(q, &s->frame, buffer, &view, &memory, err);
     if (code)
         return code;
+    restore_ids(&s->frame, image, &view);
     *out = (rl_image_view){.x = s->frame.geometry.x,
                            .y = s->frame.geometry.y,
                            .width = s->frame.geometry.width,
                            .height = s->frame.geometry.height,
                            .planes = view.planes,
                            .format = rl_format_name(view.format),
-                           .stride = view.stride};
-    memcpy(out->plane, view.plane, sizeof out->plane);
+                           .stride = view.stride,
+                           .plane_stride = view.plane};
+    for (int i = 0; i < view.planes && i < (int)(sizeof out->plane / sizeof *out->plane); i++)
+        out->plane[i] = view.pixels + (size_t)i * view.plane;
     /* The view stays valid on host-memory devices; others keep the mapping until the next map of the same buffer. */
     return rl_memory_unmap(memory, err);
 }

@@ -1,15 +1,15 @@
 #include "graph/run/sink.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
+#include <strings.h>
 
 #include "graph/base/alloc.h"
 #include "graph/base/arena.h"
 #include "graph/base/file.h"
 #include "graph/relit.h"
 #include "graph/run/sink_image.h"
-
-enum { MOST_CHANNELS = 256 };
 
 /* What of the source's header stays true of the result: cameras, time, what a studio put there. */
 static const char *const kept_attributes[] = {"camera:*",        "worldToCamera", "worldToNDC",  "timeCode",
@@ -96,20 +96,28 @@ static const char *const *letters(rl_format format, int *n)
 }
 
 typedef struct channel_list {
-    rl_exr_source rows[MOST_CHANNELS];
+    rl_exr_source *rows; /* with room for all */
     size_t n;
-    rl_arena names;
-    bool failed;
+    rl_arena arena; /* of the rows and their names */
+    bool failed;    /* out of memory */
 } channel_list;
+
+/* Room for the planes of all images and a coverage for each. */
+static void list_begin(channel_list *list, const rl_sink_image *images, size_t n)
+{
+    size_t most = n;
+    for (size_t i = 0; i < n; i++)
+        most += (size_t)images[i].planes;
+    list->rows = rl_arena_array(&list->arena, most, sizeof *list->rows);
+    list->failed = !list->rows;
+}
 
 static void add_channel(channel_list *list, const char *layer, const char *letter, rl_exr_source source)
 {
-    source.name = *layer ? rl_arena_printf(&list->names, "%s.%s", layer, letter) : rl_arena_strdup(&list->names, letter);
-    if (list->n == MOST_CHANNELS || !source.name) {
-        list->failed = true;
-        return;
-    }
-    list->rows[list->n++] = source;
+    source.name = *layer ? rl_arena_printf(&list->arena, "%s.%s", layer, letter) : rl_arena_strdup(&list->arena, letter);
+    list->failed |= !source.name;
+    if (!list->failed)
+        list->rows[list->n++] = source;
 }
 
 static void add_image(channel_list *list, const rl_sink_image *image, rl_exr_pixel type, const region *r)
@@ -118,14 +126,16 @@ static void add_image(channel_list *list, const rl_sink_image *image, rl_exr_pix
     const char *const *names = letters(image->format, &n);
     size_t at = (size_t)r->y0 * image->stride + (size_t)r->x0;
     for (int i = 0; i < image->planes; i++) {
-        const char *letter = i < n ? names[i] : rl_arena_printf(&list->names, "V%d", i);
-        rl_exr_source s = {.stride = image->stride, .type = type, .floats = image->plane[i] + at};
+        const char *letter = i < n ? names[i] : rl_arena_printf(&list->arena, "V%d", i);
+        rl_exr_source s = {.stride = image->stride, .type = type, .floats = image->pixels + (size_t)i * image->plane + at};
         if (image->format == RL_ID) {
             s.type = RL_EXR_UINT;
             s.ids = (const uint32_t *)(const void *)s.floats;
             s.floats = NULL;
         }
-        add_channel(list, image->name, letter ? letter : "V", s);
+        list->failed |= !letter;
+        if (letter)
+            add_channel(list, image->name, letter, s);
     }
 }
 
@@ -139,14 +149,30 @@ static void add_coverage(channel_list *list, const rl_sink_image *images, size_t
                         (rl_exr_source){.type = type, .floats = coverage, .stride = (size_t)width});
 }
 
-static size_t add_attributes(const rl_sink_output *o, const rl_sink_frame *f, rl_exr_attribute *attrs)
+/* 24 is 24/1, 23.976… of broadcast 24000/1001, anything else thousandths. */
+static rl_exr_value rational_fps(double fps)
+{
+    static const int denominators[] = {1, 1001, 1000};
+    rl_exr_value v = {.type = RL_EXR_T_RATIONAL};
+    for (int i = 0; i < 3; i++) {
+        int unit = denominators[i] == 1001 ? 1000 : 1;
+        v.v[1] = denominators[i];
+        v.v[0] = floor(fps * denominators[i] / unit + 0.5) * unit;
+        if (fabs(v.v[0] / v.v[1] - fps) < 5e-4)
+            break;
+    }
+    return v;
+}
+
+/* `colors`: the file holds an rgb image. Data has neither primaries nor a colour space. */
+static size_t add_attributes(const rl_sink_output *o, const rl_sink_frame *f, bool colors, rl_exr_attribute *attrs)
 {
     size_t n = 0;
     attrs[n++] = (rl_exr_attribute){"relit:version", {.type = RL_EXR_T_STRING, .text = RL_VERSION}};
     attrs[n++] = (rl_exr_attribute){"relit:pipeline", {.type = RL_EXR_T_STRING, .text = f->pipeline}};
-    if (o->space)
+    if (o->space && colors)
         attrs[n++] = (rl_exr_attribute){"relit:colorspace", {.type = RL_EXR_T_STRING, .text = o->space}};
-    if (o->primaries.known) {
+    if (o->primaries.known && colors) {
         rl_exr_value v = {.type = RL_EXR_T_CHROMATICITIES};
         memcpy(v.v, o->primaries.xy, sizeof o->primaries.xy);
         attrs[n++] = (rl_exr_attribute){"chromaticities", v};
@@ -154,8 +180,7 @@ static size_t add_attributes(const rl_sink_output *o, const rl_sink_frame *f, rl
     rl_exr_value fps;
     bool has = f->source && rl_exr_attr(f->source, f->source_part, "framesPerSecond", &fps);
     if (!has && f->fps > 0)
-        attrs[n++] = (rl_exr_attribute){"framesPerSecond",
-                                        {.type = RL_EXR_T_RATIONAL, .v = {(double)(int)(f->fps * 1000 + 0.5), 1000}}};
+        attrs[n++] = (rl_exr_attribute){"framesPerSecond", rational_fps(f->fps)};
     return n;
 }
 
@@ -164,24 +189,26 @@ static rl_code write_exr(const char *path, const rl_sink_output *o, const rl_sin
                          uint64_t *clamped, rl_error *err)
 {
     rl_exr_pixel type = o->spec->type == RL_FLOAT ? RL_EXR_FLOAT : RL_EXR_HALF;
-    channel_list *list = rl_calloc(1, sizeof *list);
-    if (!list)
-        return rl_fail_memory(err, sizeof *list);
+    channel_list list = {0};
+    list_begin(&list, images, n);
     for (size_t i = 0; i < n; i++)
-        add_image(list, &images[i], type, r);
-    add_coverage(list, images, n, coverage, r->width, type);
+        add_image(&list, &images[i], type, r);
+    add_coverage(&list, images, n, coverage, r->width, type);
     uint64_t beyond = 0;
+    bool colors = false;
+    for (size_t i = 0; i < n; i++)
+        colors |= images[i].format == RL_RGB;
     rl_exr_attribute attrs[8];
     int compression = o->spec->compression ? rl_exr_compression_named(o->spec->compression) : RL_EXR_ZIP;
     rl_exr_image image = {.data_window = r->window,
                           .display_window = f->display_window,
-                          .channels = list->rows,
-                          .n_channels = list->n,
+                          .channels = list.rows,
+                          .n_channels = list.n,
                           .compression = compression < 0 ? RL_EXR_ZIP : (rl_exr_compression)compression,
                           .level = o->spec->level,
                           .dwa_level = o->spec->quality > 0 ? (float)o->spec->quality : 0,
                           .attrs = attrs,
-                          .n_attrs = add_attributes(o, f, attrs),
+                          .n_attrs = add_attributes(o, f, colors, attrs),
                           .copy_from = f->source,
                           .copy_part = f->source_part,
                           .copy = kept_attributes,
@@ -192,11 +219,10 @@ static rl_code write_exr(const char *path, const rl_sink_output *o, const rl_sin
         image.screen_width = part->screen_width;
         memcpy(image.screen_center, part->screen_center, sizeof image.screen_center);
     }
-    rl_code code = list->failed ? rl_fail_file(err, RL_E_MEMORY, path, "too many channels for one file")
-                                : rl_exr_write(path, &image, pool, &beyond, err);
+    rl_code code = list.failed ? rl_fail_memory(err, n * sizeof *list.rows)
+                               : rl_exr_write(path, &image, pool, &beyond, err);
     *clamped += beyond;
-    rl_arena_free(&list->names);
-    rl_free(list);
+    rl_arena_free(&list.arena);
     return code;
 }
 
@@ -206,12 +232,13 @@ rl_code rl_sink_write(const char *path, const rl_sink_output *output, const rl_s
     region r;
     float *coverage = NULL;
     rl_arena arena = {0};
-    rl_code code = crop_region(frame, &r, err);
+    const char *folder = rl_path_folder(&arena, path);
+    rl_code code = folder ? crop_region(frame, &r, err) : rl_fail_memory(err, strlen(path));
     if (!code)
-        code = rl_folder_make(rl_path_folder(&arena, path), err);
+        code = rl_folder_make(folder, err);
     if (!code)
         code = make_coverage(frame, &r, pool, &coverage, err);
-    if (!code && !strcmp(rl_path_extension(path), ".exr"))
+    if (!code && !strcasecmp(rl_path_extension(path), ".exr"))
         code = write_exr(path, output, images, n_images, frame, &r, coverage, pool, clamped, err);
     else if (!code)
         code = rl_sink_write_image(path, output, &images[0], (size_t)r.y0 * images[0].stride + (size_t)r.x0, r.width,

@@ -13,13 +13,13 @@
 extern "C" {
 #endif
 
-/* One image of an output, mapped: `plane[i]` is pixel (0, 0) of the data window. */
+/* One image of an output, mapped. Pixel (0, 0) of the data window in plane i is at pixels + i * plane. */
 typedef struct rl_sink_image {
     const char *name; /* of the layer, "" for an output with one image */
     rl_format format;
     int planes;
-    const float *plane[16]; /* ids: their bits */
-    size_t stride;
+    const float *pixels; /* ids: their bits */
+    size_t stride, plane;
 } rl_sink_image;
 
 typedef struct rl_sink_frame {

@@ -57,17 +57,23 @@ static size_t check_headers(const rl_tool *tool, rl_session *session)
     for (size_t i = 0; i < session->n_sequences; i++) {
         rl_sequence *q = &session->sequences[i];
         rl_frame frame = {0};
+        bool any_good = false;
         for (size_t k = 0; k < q->frames.n; k++) {
             rl_error err = {0};
             frame.number = q->frames.numbers[k];
             if (rl_reader_open(q->reader, frame.number, &frame, &err)) {
-                bool skip = tool->args.run.on_missing == RL_MISSING_SKIP && err.code == RL_E_IO;
+                rl_on_missing how = tool->args.run.on_missing;
+                bool skip = rl_reader_missed(err.code) &&
+                            (how == RL_MISSING_SKIP || (how == RL_MISSING_HOLD && any_good));
                 if (skip)
                     rl_report(&tool->report->log, RL_WARNING, (rl_where){.file = err.file},
-                              "frame %d would be skipped: %s", frame.number, err.text);
+                              "frame %d would be %s: %s", frame.number,
+                              how == RL_MISSING_SKIP ? "skipped" : "held", err.text);
                 else
                     rl_report_error(tool->report, &err);
                 bad += !skip;
+            } else {
+                any_good = true;
             }
             rl_frame_release(&frame);
         }

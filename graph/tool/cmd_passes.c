@@ -8,7 +8,7 @@
 #include "graph/tool/tool.h"
 
 static const char *const role_names[] = {"in", "out", "history", "scratch"};
-static const char *const type_names[] = {"number", "integer", "true|false", "word", "rgb"};
+static const char *const type_names[] = {"number", "integer", "true|false", "word", "rgb", "list"};
 
 /* `pass: kernel` has no table: its ports and parameters are the user's. A test runs the example. */
 static const char kernel_name[] = "kernel";
@@ -88,21 +88,29 @@ static void print_ports(const rl_pass *pass, rl_str *out)
     }
 }
 
-static void print_rows(const char *title, rl_params rows, rl_str *out)
+/* `indent` columns from the left; the keys of a list below it. */
+static void print_each(rl_params rows, int indent, rl_str *out)
 {
-    if (!rows.n)
-        return;
     int width = (int)widest("", rows);
-    rl_str_printf(out, "\n%s\n", title);
     for (size_t i = 0; i < rows.n; i++) {
         const rl_param *row = &rows.rows[i];
-        rl_str_printf(out, "  %-*s  %s%s\n  %-*s    ", width, row->name, row->help,
-                      row->required ? " (required)" : "", width, "");
+        rl_str_printf(out, "%*s%-*s  %s%s\n%*s    ", indent, "", width, row->name, row->help,
+                      row->required ? " (required)" : "", indent + width, "");
         rl_param_describe(row, out);
         if (row->source)
             rl_str_printf(out, "; %s", row->source);
         rl_str_add(out, "\n");
+        if (row->list.n)
+            print_each(row->list, indent + width + 6, out);
     }
+}
+
+static void print_rows(const char *title, rl_params rows, rl_str *out)
+{
+    if (!rows.n)
+        return;
+    rl_str_printf(out, "\n%s\n", title);
+    print_each(rows, 2, out);
 }
 
 static void print_pass(const rl_pass *pass, rl_str *out)
@@ -127,6 +135,8 @@ static json_t *default_json(const rl_param *row)
         float f[3];
         int32_t i;
     } value = {{0}};
+    if (row->type == RL_ROWS) /* none of its own */
+        return json_string("[]");
     rl_param_default(row, &value);
     rl_param_print(row, &value, &text);
     json_t *json = json_string(rl_str_text(&text));
@@ -147,6 +157,8 @@ static json_t *rows_json(rl_params rows)
             json_object_set_new(object, "words", json_string(row->words));
         if (object && row->type != RL_ENUM && row->type != RL_BOOL)
             json_object_set_new(object, "range", json_pack("[f, f]", row->min, row->max));
+        if (object && row->list.n)
+            json_object_set_new(object, "keys", rows_json(row->list));
         json_array_append_new(list, object);
     }
     return list;

@@ -53,9 +53,10 @@ static const option options[] = {
              "may be repeated"},
     {"crop", "X,Y,W,H", SHARED, REGION, AT(run.crop),
      .help = "a region, in pixels of the display window"},
-    {"on-missing", "WORD", SHARED, WORD, AT(on_missing), .words = "error|skip",
-     .help = "what to do about an input frame that is missing:\n"
-             "error (default), or skip it"},
+    {"on-missing", "WORD", SHARED, WORD, AT(on_missing), .words = "error|skip|hold",
+     .help = "what to do about an input frame that is missing\n"
+             "or broken: error (default), skip it, or hold the\n"
+             "frame before it under its number"},
     {"ocio", "FILE", SHARED, TEXT, AT(run.ocio),
      .help = "OpenColorIO config; default: the pipeline's, else\n"
              "$OCIO, else relit's own"},

@@ -5,6 +5,7 @@
 
 int main(int argc, char **argv)
 {
+    signal(SIGXFSZ, SIG_IGN); /* `ulimit -f`: a write that fails, as on a full disk, and not the end */
     int status = rl_tool_main(argc, argv, stdout, stderr);
     if (status <= 128)
         return status;
