@@ -166,8 +166,8 @@ static inline floatv scatter_tilt(const inputs_t *in, const vector_t *v, floatv 
                  MOST_TILT);
 }
 
-/* Area of the surface that pixels (x, y) of depth z see, m² on the plane z = -1 times f_x·f_y: |dP/dx × dP/dy| of
- * P = ((x - c_x)/f_x z, -(y - c_y)/f_y z, -z); zx and zy are the slopes, metres a pixel. */
+/* Area of the surface that pixels (x, y) of depth z see, m² on the plane z = -1 times f_x·f_y: |dP/dx × dP/dy|
+ * of P = ((x - c_x)/f_x z, -(y - c_y)/f_y z, -z); zx and zy are the slopes, metres a pixel. */
 static inline floatv scatter_area_at(constant frame_t *f, floatv x, int y, floatv z, floatv zx, floatv zy)
 {
     constant camera_t *c = &f->camera;
@@ -221,8 +221,8 @@ static inline floatv scatter_load(int layout, global const float *p, constant fr
                                : rl_load4(p + plane * f->plane4, f, x, y);
 }
 
-/* color = lit + filtered · exit(albedo) · F_out, for RL_W pixels of a row; `filtered` and `stencil` have the layout
- * that is given. */
+/* color = lit + filtered · exit(albedo) · F_out, for RL_W pixels of a row; `filtered` and `stencil` have the
+ * layout that is given. */
 static inline void scatter_resolve_from(int layout, global const float *filtered, global const float *lit,
                                         global const float *albedo, global const float *normal,
                                         global const uint *stencil, global float *color, constant frame_t *f,

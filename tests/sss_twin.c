@@ -84,7 +84,7 @@ static void tilt(const twin_scene *s, int x, int y, float t[2])
 }
 
 /* |dP/dx × dP/dy| of the view-space point. */
-static double area_of(const twin_scene *s, int x, int y)
+double twin_area(const twin_scene *s, int x, int y)
 {
     const frame_t *f = &s->frame;
     const camera_t *c = &f->camera;
@@ -148,7 +148,7 @@ void twin_reference(const twin_scene *s, int x, int y, double filtered[3])
     uint32_t id = s->stencil[at(s, x, y)];
     const twin_material *m = &s->materials[id];
     double z = s->depth[at(s, x, y)], hx = z / c->focal[0], hy = z / c->focal[1], d[3], most = 0;
-    double own = area_of(s, x, y), sum[3] = {0}, weights[3] = {0};
+    double own = twin_area(s, x, y), sum[3] = {0}, weights[3] = {0};
     for (int i = 0; i < 3; i++) {
         d[i] = m->scatter_distance_mm[i] * 1e-3;
         most = fmax(most, d[i]);
@@ -165,7 +165,7 @@ void twin_reference(const twin_scene *s, int x, int y, double filtered[3])
             if (!same && m->border == 0)
                 continue;
             double dz = same ? s->depth[at(s, x + dx, y + dy)] - z : 0;
-            double area = same ? area_of(s, x + dx, y + dy) : own;
+            double area = same ? twin_area(s, x + dx, y + dy) : own;
             for (int i = 0; i < 3; i++) {
                 double w = pixel_weight(dx, dy, hx, hy, dz, d[i]) * area;
                 weights[i] += w;
@@ -274,7 +274,7 @@ void twin_burley(const twin_scene *s, int x, int y, int n, int seed, double filt
     offset = (floor(choice[1] * patterns_of(n)) + 0.5) / patterns_of(n);
     float co = (float)cos(2 * pi * floor(choice[0] * 256) / 256),
           si = (float)sin(2 * pi * floor(choice[0] * 256) / 256);
-    double z = s->depth[at(s, x, y)], scale = z / middle, own = area_of(s, x, y), sum[3] = {0},
+    double z = s->depth[at(s, x, y)], scale = z / middle, own = twin_area(s, x, y), sum[3] = {0},
            weights[3] = {0};
     float *tx = rl_malloc((size_t)n * 12), *ty = tx + n, *tw = ty + n;
     rl_burley_taps((size_t)n, offset, tx, ty, tw);
@@ -289,7 +289,7 @@ void twin_burley(const twin_scene *s, int x, int y, int n, int seed, double filt
             continue;
         double dz = same ? (s->depth[at(s, px, py)] - z) / (most * 1e-3) : 0;
         double r = sqrt(((double)u * u + (double)v * v) * scale * scale + dz * dz);
-        double area = same ? area_of(s, px, py) / own : 1;
+        double area = same ? twin_area(s, px, py) / own : 1;
         for (int k = 0; k < 3; k++) {
             double w = rl_burley_profile(r, d[k] / most) * 8 * pi * (d[k] / most) * tw[i] * area;
             weights[k] += w;

@@ -142,7 +142,7 @@ static bool same_row(const rl_param *a, const rl_param *b)
 {
     return a->type == b->type && a->min == b->min && a->max == b->max && !memcmp(a->def, b->def, sizeof a->def) &&
            same_text(a->words, b->words) && same_text(a->unit, b->unit) && same_text(a->help, b->help) &&
-           a->required == b->required && a->no_default == b->no_default;
+           a->no_default == b->no_default; /* .required is each pass's own: lighting needs d only for transmission */
 }
 
 /* material_t takes the first of equal names: the others must be the same row. */
@@ -385,6 +385,8 @@ static void run_form(const form *f, const char *what)
     size_t n = make_arguments(f, args);
     rl_error err = {0};
     for (size_t s = 0; s < f->pass->steps.n; s++) {
+        if (!rl_step_runs(f->pass, &f->pass->steps.rows[s], f->params))
+            continue;
         rl_dispatch d = {.entry = f->pass->steps.rows[s].entry, .arguments = args, .n_arguments = n, .dims = 3};
         size_t one[3] = {4, 1, 1}, phase[3] = {16, 1, 1};
         memcpy(d.global, f->pass->steps.rows[s].domain == RL_EVERY_PHASE ? phase : one, sizeof d.global);

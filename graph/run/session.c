@@ -133,7 +133,7 @@ size_t rl_session_frames(const rl_session *s, size_t capture)
 
 long long rl_session_frame(const rl_session *s, size_t capture, size_t i)
 {
-    return s->sequences[capture].frames.numbers[i];
+    return i < rl_session_frames(s, capture) ? s->sequences[capture].frames.numbers[i] : 0;
 }
 
 rl_code rl_session_plan(const rl_session *s, size_t capture, rl_plan_format format, char **text, rl_error *err)

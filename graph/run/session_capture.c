@@ -1,6 +1,7 @@
 /* The captures of a session: manifest, frames, lights, materials, graph, plan. */
 #include <stdio.h>
 #include <string.h>
+#include <strings.h>
 
 #include "graph/base/alloc.h"
 #include "graph/base/file.h"
@@ -165,6 +166,22 @@ static rl_code list_layers(rl_session *s, const rl_sequence *q, rl_layer_info **
     return RL_OK;
 }
 
+/* Image files other than EXR hold grey or colours. */
+static rl_code check_formats(const rl_session *s, const rl_graph *graph, rl_error *err)
+{
+    for (size_t i = 0; i < s->n_outputs; i++) {
+        const rl_output *o = s->outputs[i].spec;
+        const rl_image *image = &graph->images[graph->outputs[i].images[0]];
+        bool many = image->planes > 3 || image->planes == 2;
+        if (strcasecmp(rl_path_extension(o->file), ".exr") && (image->format == RL_ID || many))
+            return rl_fail(err, RL_E_CONFIG, o->file_where,
+                           "output '%s': a %s file cannot hold '%s' (%s, %d plane%s); write .exr", o->name,
+                           rl_path_extension(o->file), image->name, rl_format_name(image->format), image->planes,
+                           image->planes == 1 ? "" : "s");
+    }
+    return RL_OK;
+}
+
 static rl_code make_plan(rl_session *s, rl_sequence *q, rl_error *err)
 {
     rl_layer_info *layers = NULL;
@@ -173,6 +190,8 @@ static rl_code make_plan(rl_session *s, rl_sequence *q, rl_error *err)
     if (!code)
         code = rl_graph_build(&s->arena, s->pipeline->nodes, s->pipeline->n_nodes, layers, n, s->wanted,
                               s->n_outputs + 1, &q->graph, err);
+    if (!code)
+        code = check_formats(s, q->graph, err);
     if (!code)
         code = rl_graph_check_needs(&s->arena, q->graph, q->materials, err);
     return code ? code : rl_plan_make(&s->arena, q->graph, &q->plan, err);

@@ -1,4 +1,5 @@
 /* Frames through a session: in batches from files to files, or one at a time. */
+#include <limits.h>
 #include <string.h>
 #include <time.h>
 
@@ -346,6 +347,8 @@ rl_code rl_session_process(rl_session *s, size_t capture, long long number, cons
     s->processed = false;
     if (capture >= s->n_sequences)
         return rl_fail(err, RL_E_USAGE, RL_NOWHERE, "there is no capture %zu", capture);
+    if (number < INT_MIN || number > INT_MAX)
+        return rl_fail(err, RL_E_USAGE, RL_NOWHERE, "frame %lld is not within %d … %d", number, INT_MIN, INT_MAX);
     rl_sequence *q = &s->sequences[capture];
     rl_code code = rl_session_prepare(s, err);
     if (code)
