@@ -8,6 +8,9 @@
 #include <string.h>
 #include <cmocka.h>
 
+#include "graph/base/alloc.h"
+#include "graph/base/file.h"
+#include "graph/base/text.h"
 #include "graph/model/ambient.h"
 #include "tests/shade_scene.h"
 
@@ -224,6 +227,60 @@ static void sky_scatters_a_band_at_a_time(void **state)
     shade_scene_free(&t.scene);
 }
 
+static double first(const void *ctx, const double *v)
+{
+    (void)ctx;
+    return v[2];
+}
+
+static double second(const void *ctx, const double *v)
+{
+    (void)ctx;
+    return 1.5 * v[2] * v[2] - 0.5;
+}
+
+/* The kernel's a1, a2 and the inverse of a1, against the means of P_1 and P_2. Small means cancel in the
+ * quadrature, which is why its own error is absolute. */
+static void bands_are_means(void **state)
+{
+    enum { N = 64 };
+    static const char entry[] =
+        "kernel void bands(global const float *in, global float *out)\n"
+        "{ int i = get_global_id(0), n = get_global_size(0) / 4; floatv l = rl_load(in, RL_W * i), a = "
+        "sg_band1(l);\n"
+        "  rl_store(i < n ? a : i < 2 * n ? sg_band2(l, a) : sg_convolved(a), out, RL_W * i); }\n";
+    static float in[4 * N], out[4 * N];
+    const double up[3] = {0, 0, 1};
+    double worst = 0, close[2] = {0, 0}, inverse = 0;
+    char *file = NULL;
+    size_t size;
+    rl_str text = {0};
+    (void)state;
+    assert_int_equal(rl_file_read("kernels/sg.cl", &file, &size, NULL), RL_OK);
+    rl_str_add(&text, file);
+    rl_str_add(&text, entry);
+    for (int i = 0; i < 4 * N; i++)
+        in[i] = (float)pow(10, -2.5 + 6.0 * (i % N) / (N - 1));
+    assert_true(shade_function(rl_str_text(&text), "bands", in, out, 4 * N));
+    rl_str_free(&text);
+    rl_free(file);
+    for (int i = 0; i < N; i++) {
+        double l = (double)in[i], a1 = (double)out[i], a2 = (double)out[N + i], back = (double)out[2 * N + i];
+        worst = fmax(worst, fabs(a1 - gaussian_mean(l, up, first, NULL, 20000, 1)));
+        worst = fmax(worst, fabs(a2 - gaussian_mean(l, up, second, NULL, 20000, 1)));
+        long double x = l, exact = 1 / tanhl(x) - 1 / x; /* cancels to 1e-7 of a2 at worst, with 64 bits */
+        close[0] = fmax(close[0], fabs(a1 / (double)exact - 1));
+        close[1] = fmax(close[1], fabs(a2 / (double)(1 - 3 * exact / x) - 1));
+        inverse = fmax(inverse, l < 1e3 ? fabs(back / l - 1) : 0);
+    }
+    print_message("bands: largest error %.1g, relative %.1g, %.1g; sharpness from a band: within %.2f\n",
+                  worst, close, inverse);
+    assert_true(worst < 1e-5);
+    assert_true(close[0] < 2e-6);
+    assert_true(close[1] < 4e-5); /* right above 0.5, where the closed form begins */
+    assert_true(inverse < 0.06);  /* Banerjee's approximation, worst near 3 */
+}
+
 /* ---- lobes -----------------------------------------------------------------------------------------------
  */
 
@@ -311,6 +368,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(sky_lights_matte_and_burley),
         cmocka_unit_test(sky_scatters_a_band_at_a_time),
+        cmocka_unit_test(bands_are_means),
         cmocka_unit_test(lobes_convolve),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
