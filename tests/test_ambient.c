@@ -274,7 +274,7 @@ static void bands_are_means(void **state)
         inverse = fmax(inverse, l < 1e3 ? fabs(back / l - 1) : 0);
     }
     print_message("bands: largest error %.1g, relative %.1g, %.1g; sharpness from a band: within %.2f\n",
-                  worst, close, inverse);
+                  worst, close[0], close[1], inverse);
     assert_true(worst < 1e-5);
     assert_true(close[0] < 2e-6);
     assert_true(close[1] < 4e-5); /* right above 0.5, where the closed form begins */
