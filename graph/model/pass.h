@@ -64,6 +64,9 @@ typedef struct rl_param {
                             declares it so; rows of a list: every element must */
     bool no_default;     /* rows of the material table with min >= 0: the device sees -1 where it is not given */
     const char *required_with; /* profile rows, "KEY=a|b": required of profiles whose KEY is one of the words */
+    const char *needed_by; /* profile rows with no_default, "diffuse: sg": required of the profiles of materials with that
+                              shading word (graph.h), */
+    const char *instead;   /* unless the profile gives this other row; or NULL */
     rl_params list;      /* RL_ROWS: the keys of an element, none of them RL_ROWS */
     double most_sum;     /* float rows of a list, > 0: what the elements add up to at most, each channel (+1e-6) */
 } rl_param;
