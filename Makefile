@@ -167,6 +167,10 @@ soak:
 	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/test_batch
 	RELIT_SOAK_FRAMES=$(or $(FRAMES),2000) $(BUILD)/tests/test_batch
 
+# A real one-node Slurm on the loopback address; needs slurm-wlm, munge and root.
+slurm-test: all
+	BUILD=$(BUILD) tests/slurm.sh
+
 # ---- the rest --------------------------------------------------------------------------------------------------
 
 DEB = build-essential pkg-config libopenexr-dev libopenimageio-dev libopencolorio-dev pocl-opencl-icd ocl-icd-opencl-dev \
