@@ -213,6 +213,8 @@ static bool takes(const rl_param *row, rl_kind kind)
         return kind == RL_TEXT;
     case RL_ROWS:
         return kind == RL_LIST;
+    case RL_MATERIALS:
+        return false;
     }
     return false;
 }

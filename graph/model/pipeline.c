@@ -140,6 +140,7 @@ static rl_code read_node(parser *q, const rl_entry *entry, rl_node *node)
     if (code)
         return code;
     bool user = !!node->pass->kernel_text;
+    node->map = entry->value;
     return rl_params_read(q->arena, node->pass, node->name, entry->value, user ? rl_user_kernel_keys : keys,
                           user ? rl_user_kernel_n_keys : RL_ARRAY_LENGTH(keys), &node->params, q->err);
 }

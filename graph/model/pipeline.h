@@ -22,9 +22,10 @@ typedef struct rl_node {
     const char *name;
     rl_where where; /* of the name; RL_NOWHERE for nodes that relit adds */
     const rl_pass *pass;
-    const void *params; /* pass->params_size bytes */
+    const void *params; /* pass->params_size bytes; sets of materials are empty, see rl_material_sets_fill */
     const rl_node_input *inputs;
     size_t n_inputs;
+    const rl_value *map; /* as written; NULL for nodes that relit adds */
 } rl_node;
 
 typedef struct rl_output_layer {

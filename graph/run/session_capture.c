@@ -5,6 +5,7 @@
 
 #include "graph/base/alloc.h"
 #include "graph/base/file.h"
+#include "graph/model/materials_sets.h"
 #include "graph/model/registry.h"
 #include "graph/run/data_files.h"
 #include "graph/run/session.h"
@@ -140,8 +141,11 @@ static rl_code make_materials(rl_session *s, rl_sequence *q, rl_error *err)
         names[i] = (rl_stencil_name){.id = m->stencil_names[i].id, .name = m->stencil_names[i].name};
     for (size_t i = 0; i < p->n_nodes; i++)
         used[i] = p->nodes[i].pass;
-    return rl_materials_resolve(&s->arena, p->profiles, p->shading, p->materials, names, m->n_stencil_names, used,
-                                p->n_nodes, s->log, &q->materials, err);
+    rl_code code = rl_materials_resolve(&s->arena, p->profiles, p->shading, p->materials, names, m->n_stencil_names,
+                                        used, p->n_nodes, s->log, &q->materials, err);
+    return code ? code
+                : rl_material_sets_fill(&s->arena, p->nodes, p->n_nodes, q->materials, names, m->n_stencil_names,
+                                        &q->nodes, err);
 }
 
 /* The layers that the graph can bind: single ones, each light's, and the planes of the active lights together. */
@@ -166,6 +170,20 @@ static rl_code list_layers(rl_session *s, const rl_sequence *q, rl_layer_info **
     return RL_OK;
 }
 
+/* Says, once a capture, what passes do without an input that they would like to have. */
+static void note_absent(const rl_session *s, const rl_sequence *q)
+{
+    for (size_t i = 0; i < q->plan->n_nodes; i++) {
+        const rl_graph_node *node = &q->graph->nodes[q->plan->nodes[i].node];
+        for (size_t p = 0; p < node->pass->ports.n; p++) {
+            const rl_port *port = &node->pass->ports.rows[p];
+            if (port->if_absent && node->images[p] < 0)
+                rl_report(s->log, RL_NOTE, node->where, "pass '%s' (%s): capture '%s' has no layer '%s': %s", node->name,
+                          node->pass->name, q->manifest->name, port->name, port->if_absent);
+        }
+    }
+}
+
 /* Image files other than EXR hold grey or colours. */
 static rl_code check_formats(const rl_session *s, const rl_graph *graph, rl_error *err)
 {
@@ -188,13 +206,17 @@ static rl_code make_plan(rl_session *s, rl_sequence *q, rl_error *err)
     size_t n = 0;
     rl_code code = list_layers(s, q, &layers, &n, err);
     if (!code)
-        code = rl_graph_build(&s->arena, s->pipeline->nodes, s->pipeline->n_nodes, layers, n, s->wanted,
+        code = rl_graph_build(&s->arena, q->nodes, s->pipeline->n_nodes, layers, n, s->wanted,
                               s->n_outputs + 1, &q->graph, err);
     if (!code)
         code = check_formats(s, q->graph, err);
     if (!code)
         code = rl_graph_check_needs(&s->arena, q->graph, q->materials, err);
-    return code ? code : rl_plan_make(&s->arena, q->graph, &q->plan, err);
+    if (!code)
+        code = rl_plan_make(&s->arena, q->graph, &q->plan, err);
+    if (!code)
+        note_absent(s, q);
+    return code;
 }
 
 static bool wants_ids(const rl_session *s)
@@ -206,8 +228,20 @@ static bool wants_ids(const rl_session *s)
     return false;
 }
 
+/* What reading the files of a frame takes besides its buffers: they are read one after the other. */
+static uint64_t decode_bytes(const rl_frame *f, int threads)
+{
+    uint64_t most = 0;
+    for (int i = 0; i < RL_MOST_FILES; i++)
+        for (int part = 0; f->files[i] && part < rl_exr_parts(f->files[i]); part++) {
+            uint64_t bytes = rl_exr_read_scratch(f->files[i], part, threads);
+            most = bytes > most ? bytes : most;
+        }
+    return most;
+}
+
 /* The size of the first frame that can be opened; when none can, the error of the first. */
-static rl_code measure(rl_sequence *q, rl_error *err)
+static rl_code measure(const rl_session *s, rl_sequence *q, rl_error *err)
 {
     rl_error first = {0};
     for (size_t i = 0; i < q->frames.n; i++) {
@@ -215,6 +249,7 @@ static rl_code measure(rl_sequence *q, rl_error *err)
         rl_error one = {0};
         rl_code code = rl_reader_open(q->reader, f.number, &f, &one);
         q->geometry = f.geometry;
+        q->decode_bytes = code ? 0 : decode_bytes(&f, s->threads);
         rl_frame_free(&f);
         if (!rl_reader_missed(code)) {
             *err = code ? one : *err;
@@ -239,7 +274,7 @@ static rl_code make_reader(rl_session *s, rl_sequence *q, rl_error *err)
                              .limit = s->options.memory_limit,
                              .log = s->log};
     rl_code code = rl_reader_new(&setup, &q->reader, err);
-    return code || q->manifest->n_patterns == 0 ? code : measure(q, err);
+    return code || q->manifest->n_patterns == 0 ? code : measure(s, q, err);
 }
 
 static rl_code open_sequence(rl_session *s, rl_sequence *q, rl_error *err)
