@@ -146,9 +146,11 @@ static rl_code check_metric(const rl_tool *tool, const comparison *c, rl_metric 
                             "%s compares colours, but the channels are %s; take --metric rmse, max or psnr",
                             rl_metric_name(metric), c->reference.channels);
     if (is_color(metric) && !c->reference.rec709)
-        rl_report(log, RL_NOTE, (rl_where){.file = tool->args.operand},
-                  "its primaries are not those of Rec. 709, as which %s takes its values",
-                  rl_metric_name(metric));
+        rl_report(
+            log, RL_NOTE, (rl_where){.file = tool->args.operand},
+            "its primaries are not those of Rec. 709; %s takes its numbers as if they were, as the published "
+            "tool does",
+            rl_metric_name(metric));
     if (c->reference.rec709 != c->test.rec709)
         rl_report(log, RL_WARNING, (rl_where){.file = tool->args.second},
                   "its primaries differ from those of '%s': numbers are compared as they are",
