@@ -41,6 +41,9 @@ typedef struct rl_sequence {
     rl_geometry geometry; /* of the first frame */
     rl_reader *reader;
     rl_executor *executor; /* NULL until prepared */
+    bool has_last;         /* the frame that ran last, and may be the past of the next one */
+    int last_number;
+    camera_t last_camera;
 } rl_sequence;
 
 struct rl_session {
@@ -85,8 +88,8 @@ void rl_sequence_close(rl_sequence *sequence);
 /* session_paths.c: no two outputs, captures or frames write one file. */
 rl_code rl_session_paths(rl_session *session, rl_error *err);
 
-/* session_run.c: runs the kernels on a loaded frame. `cut`: history does not reach here. */
-rl_code rl_session_execute(rl_session *session, rl_sequence *sequence, rl_frame *frame, bool cut, rl_error *err);
+/* session_run.c: runs the kernels on a loaded frame; decides whether history reaches it. */
+rl_code rl_session_execute(rl_session *session, rl_sequence *sequence, rl_frame *frame, rl_error *err);
 /* Where the planes of a graph output's image are, mapped; unmap with the memory. */
 rl_code rl_session_map_image(const rl_sequence *sequence, const rl_frame *frame, int buffer, rl_sink_image *out,
                              rl_memory **memory, rl_error *err);

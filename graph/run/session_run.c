@@ -27,18 +27,33 @@ static rl_code fit_buffers(rl_sequence *q, rl_frame *f, rl_error *err)
     return rl_frame_buffers_new(q->executor, &f->geometry, &f->buffers, err);
 }
 
-rl_code rl_session_execute(rl_session *s, rl_sequence *q, rl_frame *f, bool cut, rl_error *err)
+/* History ends where the manifest says, at a gap of the numbers, after a frame that failed, at a jump of the camera. */
+static bool is_cut(const rl_sequence *q, const rl_frame *f)
+{
+    const rl_manifest *m = q->manifest;
+    if (!q->has_last || rl_frames_find(&m->cuts, f->number) >= 0)
+        return true;
+    long here = rl_frames_find(&m->frames, f->number), last = rl_frames_find(&m->frames, q->last_number);
+    bool gap = here >= 0 && last >= 0 ? here != last + 1 : f->number != q->last_number + 1;
+    return gap || rl_camera_jumped(&q->last_camera, &f->camera, 10);
+}
+
+rl_code rl_session_execute(rl_session *s, rl_sequence *q, rl_frame *f, rl_error *err)
 {
     rl_code code = rl_executor_resize(q->executor, &f->geometry, err);
     if (code)
         return code;
-    if (cut)
+    if (is_cut(q, f))
         rl_executor_cut(q->executor);
     rl_session_light_values(q, &f->camera, q->light_values);
     rl_frame_values values = {
         .number = f->number, .camera = f->camera, .lights = q->light_values, .n_lights = (int)q->n_lights,
         .ambient = &s->ambient};
-    return rl_executor_run(q->executor, f->buffers, &values, NULL, err);
+    code = rl_executor_run(q->executor, f->buffers, &values, NULL, err);
+    q->has_last = !code;
+    q->last_number = f->number;
+    q->last_camera = f->camera;
+    return code;
 }
 
 /* ---- writing --------------------------------------------------------------------------------------------- */
@@ -149,9 +164,6 @@ typedef struct batch_state {
     const rl_run_hooks *hooks;
     rl_run_summary *summary;
     size_t done_before, total;
-    bool history; /* the frame before this one ran, without a gap */
-    int previous;
-    camera_t camera;
 } batch_state;
 
 /* The frame of a number, under the files of another one when that is held. */
@@ -204,28 +216,18 @@ static void batch_load(void *ctx, size_t item, int slot)
     f->load_s = now_s() - start;
 }
 
-/* History ends where the manifest says, at a gap of the numbers, after a frame that failed, at a jump of the camera. */
-static bool is_cut(const batch_state *b, const rl_frame *f)
-{
-    const rl_manifest *m = b->q->manifest;
-    if (!b->history || rl_frames_find(&m->cuts, f->number) >= 0)
-        return true;
-    long here = rl_frames_find(&m->frames, f->number), last = rl_frames_find(&m->frames, b->previous);
-    return here != last + 1 || rl_camera_jumped(&b->camera, &f->camera, 10);
-}
-
 static void batch_run(void *ctx, size_t item, int slot)
 {
     (void)item;
     batch_state *b = ctx;
     rl_frame *f = &b->frames[slot];
     double start = now_s();
-    bool cut = f->error.code || b->held[slot] || is_cut(b, f);
+    if (f->error.code || b->held[slot])
+        b->q->has_last = false;
     if (!f->error.code)
-        rl_session_execute(b->s, b->q, f, cut, &f->error);
-    b->history = !f->error.code && !b->held[slot]; /* a held frame is no past of the next one */
-    b->previous = f->number;
-    b->camera = f->camera;
+        rl_session_execute(b->s, b->q, f, &f->error);
+    if (f->error.code || b->held[slot])
+        b->q->has_last = false; /* a held frame is no past of the next one */
     f->run_s = now_s() - start;
 }
 
@@ -293,6 +295,7 @@ static rl_code run_sequence(rl_session *s, rl_sequence *q, const rl_run_hooks *h
     b->summary = summary;
     b->done_before = done;
     b->total = total;
+    q->has_last = false;
     rl_batch batch = {.items = q->frames.n,
                       .in_flight = in_flight(s, q),
                       .load = batch_load,
@@ -336,8 +339,7 @@ rl_code rl_session_run(rl_session *s, const rl_run_hooks *hooks, rl_run_summary 
 void rl_session_cut(rl_session *s)
 {
     for (size_t i = 0; i < s->n_sequences; i++)
-        if (s->sequences[i].executor)
-            rl_executor_cut(s->sequences[i].executor);
+        s->sequences[i].has_last = false;
 }
 
 rl_code rl_session_process(rl_session *s, size_t capture, long long number, const rl_frame_data *data, rl_error *err)
@@ -364,8 +366,9 @@ rl_code rl_session_process(rl_session *s, size_t capture, long long number, cons
     if (!code)
         code = data ? rl_reader_memory_pixels(q->reader, data, f, s->pool, err) : rl_reader_pixels(q->reader, f, s->pool, err);
     if (!code)
-        code = rl_session_execute(s, q, f, false, err);
+        code = rl_session_execute(s, q, f, err);
     s->processed = !code;
+    q->has_last = q->has_last && !code;
     return code;
 }
 
