@@ -14,7 +14,7 @@ typedef struct taa_params {
 static const rl_param params[] = {
     P(taa_params, RL_F32, blend, 0, 1, 0.05, "ratio", "least weight of the current frame"),
     P(taa_params, RL_F32, clip_gamma, 0, 8, 1, "stddev",
-      "half width of the colour box that the history is clipped to; doubled where nothing moves",
+      "half width of the colour box that the history is clipped to; tripled where nothing moves",
       .source = "Salvi 2016"),
     P_MATERIALS(taa_params, exclude, "what is not accumulated: always the current frame"),
 };
