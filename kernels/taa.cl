@@ -116,24 +116,26 @@ static inline intv nearest_same(constant frame_t *f, const history_t *h, uintv i
 /* Lanes of `mask` whose surface was at the place. Where a pixel is alone now no straight edge goes through it, and the
  * nearest history pixel must be of its surface, or most of 3x3: what was there then is smaller than a pixel, and this
  * frame's jitter has missed it. Elsewhere, at edges, it is a matter of jitter anyway: the depths of its
- * material in 3x3, now and then, must overlap. (Ranges, since towards its outline a surface falls off within a pixel.) */
+ * material in 3x3 now and in 3x3 around each pixel between which the place lies must overlap. (Ranges, since towards its outline a surface falls off within a pixel.) */
 static inline intv same_surface(constant frame_t *f, const history_t *h, uintv id, const place_t *p, intv mask, int x, int y,
                                 intv right, intv below, int whole)
 {
+    intv across = p->dx != floor(p->dx), down = p->dy != floor(p->dy);
     floatv low = 2 * FAR, high = 0.0f, z = p->then;
     intv most = 0, same = p->alone & nearest_same(f, h, id, z, x, y, right, below, whole);
     if (!rl_any(mask & ~same))
         return same;
     for (int j = -1; j < 3 - whole; j++) {
         for (int i = -1; i < 3 - whole; i++) {
-            intv use = (i == -1 ? ~right : i == 2 ? right : (intv)-1) & (j == -1 ? ~below : j == 2 ? below : (intv)-1);
+            intv near = (i == -1 ? ~right : i == 2 ? right : (intv)-1) & (j == -1 ? ~below : j == 2 ? below : (intv)-1);
+            intv use = (i == 2 ? across : (intv)-1) & (j == 2 ? down : (intv)-1);
 #if HAS_stencil
             use &= rl_load_id_edge(h->stencil, f, x + i, y + j) == id;
 #endif
             floatv t = far_if_empty(tap(h->depth, f, x + i, y + j));
             low = rl_select(low, fmin(low, t), use);
             high = rl_select(high, fmax(high, t), use);
-            most -= use & (fabs(t - z) <= 2 * DEPTH_TOLERANCE * z);
+            most -= use & near & (fabs(t - z) <= 2 * DEPTH_TOLERANCE * z);
         }
     }
     same |= p->alone & (most >= MOST);

@@ -149,9 +149,9 @@ static place find_place(const shade_run *run, int x, int y)
     return p;
 }
 
-/* Whether history pixel (x, y) or most of 3x3 around it show the surface of p or, where p is not alone, the 3x3 show its
- * material at depths around p's. */
-static bool shows(const shade_run *run, int x, int y, uint32_t id, const place *p)
+/* Whether history pixel (x, y) or most of 3x3 around it show the surface of p or, where p is not alone, the 3x3 around
+ * each pixel around (px, py) show its material at depths around p's. */
+static bool shows(const shade_run *run, int x, int y, double px, double py, uint32_t id, const place *p)
 {
     double low = 2 * far_depth, high = 0, z = p->then;
     int same = 0;
@@ -163,8 +163,15 @@ static bool shows(const shade_run *run, int x, int y, uint32_t id, const place *
         same += fabs(t - z) <= 0.04 * z;
         if (p->alone && i == 4 && fabs(t - z) <= 0.04 * z)
             return true;
-        low = fmin(low, t);
-        high = fmax(high, t);
+    }
+    for (int j = (int)floor(py) - 1; j <= (int)ceil(py) + 1; j++) {
+        for (int i = (int)floor(px) - 1; i <= (int)ceil(px) + 1; i++) {
+            double t = depth_at(run, TAA_LAST_DEPTH, i, j);
+            if (run->images[TAA_STENCIL] && tap_id(run, TAA_LAST_STENCIL, i, j) != id)
+                continue;
+            low = fmin(low, t);
+            high = fmax(high, t);
+        }
     }
     return p->alone ? same >= 5 : p->high >= low * 0.98 && p->low <= high * 1.02;
 }
@@ -216,7 +223,7 @@ void twin_taa(const shade_run *run, int x, int y, double *out)
     if (p->exclude[id / 32] >> id % 32 & 1)
         return;
     double n = tap(run, TAA_LAST_COUNT, 0, nx, ny);
-    if (!shows(run, nx, ny, id, &at) || (n < 0 && (at.alone || (at.behind && !at.follows))))
+    if (!shows(run, nx, ny, px, py, id, &at) || (n < 0 && (at.alone || (at.behind && !at.follows))))
         return;
     n = at.edge && !at.still ? fmin(fabs(n), 4) : fabs(n);
     for (int c = 0; c < 3; c++)
