@@ -7,6 +7,7 @@
 #   make fuzz        changed inputs against parsers and readers, FUZZ_SECONDS=60 each
 #   make soak        2,000 frames: memory flat, nothing leaked
 #   make bench       kernels and codecs against their peers
+#   make accuracy    TRUTH=folder: every model against a path-traced truth (tests/accuracy.c)
 #   make install     PREFIX=/usr/local: program, library, headers, relit.pc, configs, kernels
 #   make deps        Debian packages
 #   make format      clang-format 14 (make format-check only looks); make layers: includes point one way only
@@ -52,6 +53,7 @@ TESTS   := $(patsubst tests/%.c,$(BUILD)/tests/%,$(wildcard tests/test_*.c))
 SCRIPTS := $(wildcard tests/test_*.sh)
 # Programs of their own; all other files in tests/ are helpers that they share.
 MAINS   := tests/test_%.c tests/bench_%.c tests/fit_%.c tests/make_%.c tests/example.c tests/accuracy.c tests/temporal.c tests/fuzz/main.c
+BENCHES := $(patsubst tests/%.c,$(BUILD)/tests/%,$(wildcard tests/bench_*.c))
 HELP_O  := $(patsubst tests/%.c,$(BUILD)/tests/%.o,$(filter-out $(MAINS),$(wildcard tests/*.c tests/fuzz/*.c)))
 
 all: $(BUILD)/relit $(BUILD)/librelit.a $(BUILD)/librelit.so $(BUILD)/relit_oiio.so
@@ -131,23 +133,24 @@ $(BUILD)/tests/%: $(BUILD)/tests/%.o $(BUILD)/tests/sanitizers.o $(BUILD)/tests/
 	$(call say,link $@)
 	$(Q)$(CC) $(LDFLAGS) -o $@ $^ $(LIBS) -lcmocka
 
-# It loads the module; so does whatever writes PNG files.
-$(BUILD)/tests/test_image_file: | $(BUILD)/relit_oiio.so
+# They load the module; so does whatever writes PNG files.
+$(BUILD)/tests/test_image_file $(BUILD)/tests/test_sg_run: | $(BUILD)/relit_oiio.so
 
-test-build: all $(TESTS)
+test-build: all $(TESTS) $(BENCHES)
 
 test: deps
 	@$(MAKE) --no-print-directory -j2 test-build layers
 	@BUILD=$(BUILD) tests/run.sh $(TESTS) $(SCRIPTS)
 
-ASAN = BUILD=build-asan SAN="-fsanitize=address,undefined -fno-sanitize-recover=undefined"
+SANITIZE = -fsanitize=address,undefined -fno-sanitize-recover=undefined
+ASAN     = BUILD=build-asan SAN="$(SANITIZE)"
 
 test-asan: deps
 	@$(MAKE) --no-print-directory -j2 $(ASAN) test-build
-	@BUILD=build-asan ASAN_OPTIONS=detect_leaks=0 tests/run.sh $(patsubst $(BUILD)/%,build-asan/%,$(TESTS))
+	@$(ASAN) ASAN_OPTIONS=detect_leaks=0 tests/run.sh $(patsubst $(BUILD)/%,build-asan/%,$(TESTS))
 
 # Kernels and codecs against their peers; tests/bench_batch.sh says what can be chosen.
-bench: all $(BUILD)/tests/bench_sss $(BUILD)/tests/bench_capture
+bench: all $(BENCHES)
 	$(BUILD)/tests/bench_sss
 	@BUILD=$(BUILD) tests/bench_batch.sh
 
@@ -186,6 +189,12 @@ deps:
 	  $$sudo apt-get update -qq && DEBIAN_FRONTEND=noninteractive $$sudo apt-get install -y -qq --no-install-recommends $$missing; \
 	fi
 
+# Pictures of the error go to OUT.
+OUT ?= out/accuracy
+accuracy: all $(BUILD)/tests/accuracy
+	@test -n "$(TRUTH)" || { echo "give TRUTH=folder, as tests/accuracy_scene.h describes it" >&2; exit 2; }
+	@$(BUILD)/tests/accuracy $(TRUTH) $(OUT)
+
 install: all
 	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/lib/pkgconfig $(DESTDIR)$(PREFIX)/lib/relit \
 	  $(DESTDIR)$(PREFIX)/include/relit/graph/base $(DESTDIR)$(PREFIX)/share/relit/kernels
@@ -212,4 +221,4 @@ layers:
 clean:
 	rm -rf $(BUILD) build-asan
 
-.PHONY: all demo bench soak slurm-test test test-build test-asan deps install format format-check layers clean fuzz
+.PHONY: all demo bench test test-build test-asan deps install format format-check layers clean fuzz accuracy soak slurm-test

@@ -83,7 +83,7 @@ rl_code rl_session_prepare(rl_session *session, rl_error *err);
 
 size_t rl_session_captures(const rl_session *session);
 const char *rl_session_capture_name(const rl_session *session, size_t capture);
-/* Frame numbers that a run processes, in order. */
+/* Frame numbers that a run processes, in order; 0 for captures and frames that do not exist. */
 size_t rl_session_frames(const rl_session *session, size_t capture);
 long long rl_session_frame(const rl_session *session, size_t capture, size_t i);
 

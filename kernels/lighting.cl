@@ -1,131 +1,4 @@
-/* Direct light. Everything is in world space and metres; `w` is the camera's ray per metre of depth, so the point is
- * P = C + z w and what matters, n.(L - P) = n.(L - C) - z n.w, needs n.w once a pixel. Near the terminator that
- * difference cancels: it is taken in double where the device has doubles (error of n.l 1e-8 against 1e-7 without). */
-#ifdef cl_khr_fp64
-#pragma OPENCL EXTENSION cl_khr_fp64 : enable
-typedef double widest;
-typedef RL_CAT(double, RL_W) widev;
-#define to_widev(v)  RL_CAT(convert_double, RL_W)(v)
-#define to_narrow(v) RL_CAT(convert_float, RL_W)(v)
-#else
-typedef float widest;
-typedef floatv widev;
-#define to_widev(v)  (v)
-#define to_narrow(v) (v)
-#endif
-
-enum { POST, PRE_POST };
-enum { DISNEY, LAMBERT };
-enum { GGX };
-enum { EXIT_IN_SSS, EXIT_IN_LIGHTING };
-enum { OPAQUE, THIN, THICK, BEER_LAMBERT };
-enum { FROM_MAX, FROM_LAYER, FROM_SHADOW };
-
-/* Below this alpha a highlight of a light without size would be narrower than a pixel's worth of normals. */
-#define ALPHA_MIN 1e-3f
-
-typedef struct surface_t {
-    floatv n[3], w[3], v[3]; /* shading normal; ray per metre of depth; towards the camera, unit */
-    widev wide_n[3], nw;     /* the normal again; z n.w */
-    floatv z, nv;            /* depth; n.v */
-    floatv albedo[3], thickness, roughness, specular, metallic;
-} surface_t;
-
-typedef struct ray_t {
-    floatv l[3], nl, falloff; /* towards the light, unit; n.l; 1/d^2 and cone */
-    floatv visibility, shadow_thickness;
-    int has_thickness; /* shadow_thickness is known */
-} ray_t;
-
-/* F_dt(c) = 1 - (1 - |c|)^5 / 2, Golubev 2018 after Burley 2015. */
-static inline floatv transmit(int diffuse, floatv c)
-{
-    if (diffuse == LAMBERT)
-        return 1.0f;
-    floatv a = fmax(1.0f - fabs(c), 0.0f), a2 = a * a;
-    return fma(-0.5f * a2 * a2, a, 1.0f);
-}
-
-static inline floatv dot3(const floatv *a, const floatv *b)
-{
-    return fma(a[0], b[0], fma(a[1], b[1], a[2] * b[2]));
-}
-
-static inline void view_surface(surface_t *s, constant frame_t *f, int x, int y)
-{
-    constant camera_t *c = &f->camera;
-    widev px = to_widev(rl_to_floatv(RL_LANES + (x + f->origin[0])));
-    widev rx = (px + ((widest)c->jitter[0] + 0.5f - c->centre[0])) / (widest)c->focal[0];
-    widest py = (widest)(y + f->origin[1]) + 0.5f + c->jitter[1];
-    widest ry = (c->centre[1] - py) / c->focal[1];
-    widev nw = 0;
-    for (int i = 0; i < 3; i++) {
-        widev w = rx * c->to_world[4 * i] + (ry * c->to_world[4 * i + 1] - c->to_world[4 * i + 2]);
-        s->wide_n[i] = to_widev(s->n[i]);
-        s->w[i] = to_narrow(w);
-        nw = s->wide_n[i] * w + nw;
-    }
-    s->nw = nw * to_widev(s->z);
-    floatv inverse = rsqrt(dot3(s->w, s->w));
-    for (int i = 0; i < 3; i++)
-        s->v[i] = -s->w[i] * inverse;
-    s->nv = to_narrow(-nw) * inverse;
-}
-
-/* Smooth between the cone's edges, t^2 (3 - 2t), the same at both. */
-static inline floatv cone(constant light_t *light, const floatv *l)
-{
-    floatv c = -fma(l[0], light->direction[0], fma(l[1], light->direction[1], l[2] * light->direction[2]));
-    float scale = 1.0f / fmax(light->cos_inner - light->cos_outer, 1e-6f);
-    floatv t = clamp((c - light->cos_outer) * scale, 0.0f, 1.0f);
-    return t * t * fma((floatv)-2.0f, t, 3.0f);
-}
-
-static inline void aim(ray_t *r, const surface_t *s, constant light_t *light, constant camera_t *c)
-{
-    widev nl = 0;
-    if (light->type == LIGHT_DIRECTIONAL) {
-        for (int i = 0; i < 3; i++) {
-            r->l[i] = -light->direction[i];
-            nl = s->wide_n[i] * -(widest)light->direction[i] + nl;
-        }
-        r->nl = to_narrow(nl);
-        r->falloff = 1.0f;
-        return;
-    }
-    nl = -s->nw;
-    for (int i = 0; i < 3; i++) {
-        widest from_camera = (widest)light->position[i] - c->to_world[4 * i + 3];
-        r->l[i] = fma(-s->z, s->w[i], (floatv)(float)from_camera);
-        nl = s->wide_n[i] * from_camera + nl;
-    }
-    floatv inverse = rsqrt(fmax(dot3(r->l, r->l), 1e-12f)); /* a light on the surface stays finite */
-    for (int i = 0; i < 3; i++)
-        r->l[i] *= inverse;
-    r->nl = to_narrow(nl) * inverse;
-    r->falloff = inverse * inverse;
-    if (light->type == LIGHT_SPOT)
-        r->falloff *= cone(light, r->l);
-}
-
-/* D V of GGX with the height-correlated Smith term (Heitz 2014), and Schlick's (1 - v.h)^5 in `fresnel`. 1 - (n.h)^2
- * comes from the cross product, since it cancels where a highlight is sharp. */
-static inline floatv lobe(const surface_t *s, const ray_t *r, floatv roughness, floatv *fresnel)
-{
-    floatv alpha = fmax(roughness * roughness, ALPHA_MIN), a2 = alpha * alpha;
-    floatv nl = fmax(r->nl, 0.0f), nv = fmax(s->nv, 0.0f);
-    floatv h[3] = {r->l[0] + s->v[0], r->l[1] + s->v[1], r->l[2] + s->v[2]};
-    floatv hh = fmax(dot3(h, h), 1e-12f), inverse = rsqrt(hh);
-    floatv nh = fmax(r->nl + s->nv, 0.0f) * inverse;
-    floatv cross[3] = {s->n[1] * h[2] - s->n[2] * h[1], s->n[2] * h[0] - s->n[0] * h[2],
-                       s->n[0] * h[1] - s->n[1] * h[0]};
-    floatv sine = dot3(cross, cross) * inverse * inverse;
-    floatv denominator = fma(a2 * nh, nh, sine);
-    floatv f = fmax(1.0f - 0.5f * hh * inverse, 0.0f), f2 = f * f;
-    floatv smith = nl * sqrt(fma(nv * nv, 1.0f - a2, a2)) + nv * sqrt(fma(nl * nl, 1.0f - a2, a2));
-    *fresnel = f2 * f2 * f;
-    return a2 * (0.5f / RL_PI) / (denominator * denominator * fmax(smith, 1e-12f));
-}
+/* Light on the G-buffer, behind sg.cl, surface.cl and sg_shade.cl. */
 
 /* How much of the light on the back face comes through, without cosine, F_in and 1/pi (DESIGN 4.5): the slab of
  * Golubev 2018, (e^-st + 3 e^-st/3) / 4, or Helix's Beer-Lambert law. `back` is |n.l| there. */
@@ -164,26 +37,30 @@ static inline void sum_lights(constant material_t *m, const surface_t *s, consta
                               floatv *specular)
 {
     int transmits = m->has_profile && m->shading_transmission && m->profile_transmission != OPAQUE;
+    int scattered = scatters(m);
     for (int i = 0; i < f->lights; i++) {
         constant light_t *light = &lights[i];
         ray_t r;
         aim(&r, s, light, &f->camera);
-        if (!transmits && !rl_any(r.nl > 0.0f))
+        if (!transmits && !scattered && !rl_any(r.nl > 0.0f))
             continue;
         r.visibility = 1.0f;
         r.shadow_thickness = 0.0f;
         r.has_thickness = 0;
         if (HAS_shadow && light->shadow >= 0)
             r.visibility = rl_load(shadow, light->shadow * f->plane + at);
-        if (HAS_shadow_thickness && transmits && light->shadow_thickness >= 0) {
+        if (HAS_shadow_thickness && (transmits || scattered) && light->shadow_thickness >= 0) {
             r.shadow_thickness = rl_load(shadow_thickness, light->shadow_thickness * f->plane + at);
             r.has_thickness = 1;
         }
         floatv entered = r.falloff * transmit(m->shading_diffuse, r.nl);
         floatv lit = r.falloff * r.visibility * fmax(r.nl, 0.0f);
         floatv front = entered * r.visibility * fmax(r.nl, 0.0f);
-        for (int c = 0; c < 3; c++)
+        for (int c = 0; c < 3; c++) {
+            if (scattered)
+                front = r.falloff * scatter_visibility(s, &r) * sg_irradiance(&s->sg[c], dot3(s->bent[c], r.l));
             diffuse[c] += light->intensity[c] * front;
+        }
         if (transmits && rl_any(r.nl < 0.0f)) {
             floatv back = fmax(-r.nl, 0.0f), t[3];
             through(m, s, &r, back, t);
@@ -210,18 +87,20 @@ static inline floatv given(float own, int has_layer, global const float *layer, 
 
 /* One material for a whole vector: what enters (`diffuse`) and what is complete (`lit`). */
 static inline void shade(constant material_t *m, surface_t *s, constant frame_t *f, constant light_t *lights,
-                         global const float *shadow, global const float *shadow_thickness, int at, floatv *diffuse,
-                         floatv *lit)
+                         constant ambient_t *ambient, global const float *shadow,
+                         global const float *shadow_thickness, int at, floatv *diffuse, floatv *lit)
 {
     floatv sum[3] = {0.0f, 0.0f, 0.0f};
     for (int c = 0; c < 3; c++)
         lit[c] = diffuse[c] = 0.0f;
     sum_lights(m, s, f, lights, shadow, shadow_thickness, at, sum, lit);
+    if (ambient->on)
+        add_ambient(m, s, ambient, sum);
     floatv scale = (1.0f / RL_PI) * (1.0f - s->metallic);
     if (!m->has_profile || m->shading_exit_transmission == EXIT_IN_LIGHTING)
         scale *= transmit(m->shading_diffuse, s->nv);
     for (int c = 0; c < 3; c++) {
-        if (!m->has_profile)
+        if (!m->has_profile || scatters(m))
             lit[c] = fma(sum[c] * scale, s->albedo[c], lit[c]);
         else
             diffuse[c] = sum[c] * scale * (m->profile_texturing == PRE_POST ? sqrt(s->albedo[c]) : 1.0f);
@@ -231,8 +110,9 @@ static inline void shade(constant material_t *m, surface_t *s, constant frame_t 
 kernel void lighting(global const float *albedo, global const float *normal, global const float *depth,
                      global const uint *stencil, global const float *thickness, global const float *shadow,
                      global const float *shadow_thickness, global const float *roughness, global const float *specular,
-                     global const float *metallic, global const float *emission, global float *diffuse,
-                     global float *lit, constant frame_t *f, constant material_t *materials, constant light_t *lights)
+                     global const float *metallic, global const float *emission, global const float *curvature,
+                     global const float *smooth_normal, global float *diffuse, global float *lit, constant frame_t *f, constant material_t *materials, constant light_t *lights,
+                     constant ambient_t *ambient)
 {
     int x = RL_W * (int)get_global_id(0), y = (int)get_global_id(1), at = rl_index(f, x, y);
     uintv id = rl_load_id(stencil, at);
@@ -257,7 +137,9 @@ kernel void lighting(global const float *albedo, global const float *normal, glo
         s.roughness = given(m->material_roughness, HAS_roughness, roughness, at, 0.5f);
         s.specular = given(m->material_specular, HAS_specular, specular, at, 0.04f);
         s.metallic = given(m->material_metallic, HAS_metallic, metallic, at, 0.0f);
-        shade(m, &s, f, lights, shadow, shadow_thickness, at, d, l);
+        if (scatters(m))
+            scatter_surface(m, &s, f, curvature, smooth_normal, at);
+        shade(m, &s, f, lights, ambient, shadow, shadow_thickness, at, d, l);
         for (int c = 0; c < 3; c++) {
             out_diffuse[c] = rl_select(out_diffuse[c], d[c], mask);
             if (HAS_emission)

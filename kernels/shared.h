@@ -56,4 +56,19 @@ typedef struct light_t {
     int shadow_thickness;       /* plane of the shadow_thickness port, -1: 0 */
 } light_t;
 
+/* Light from everywhere, without shadows; radiance in the working space, directions in world space. */
+#define RL_LOBES 16
+typedef struct lobe_t { /* a spherical Gaussian */
+    float axis[3];      /* unit, towards the light */
+    float sharpness;    /* 1e-3 to 1e4 */
+    float flux[3];      /* its integral over all directions */
+} lobe_t;
+
+typedef struct ambient_t {
+    int on;       /* 0: no light, nothing else is looked at */
+    int lobes;
+    float sh[27]; /* coefficient i of channel c at 3 i + c; real orthonormal harmonics, 1 y z x xy yz zz xz xx-yy */
+    lobe_t lobe[RL_LOBES];
+} ambient_t;
+
 #endif

@@ -2,139 +2,23 @@
  * without jitter: a static camera gives exactly 0. Lanes whose displacement has the same whole part are done together,
  * so that every history load is contiguous. */
 
-#define FAR             1e18f          /* depth where there is nothing */
-#define DEPTH_TOLERANCE 0.02f          /* of the depth: history nearer or farther shows something else */
+#define DEPTH_TOLERANCE 0.02f          /* of the depth: what is nearer or farther is something else */
 #define SNAP            (1.0f / 1024)  /* pixels: displacements this close to a whole number are taken as whole */
+#define SLIDES          0.25f          /* pixels a frame: an edge that moves faster over what is behind it leaves it behind */
+#define EDGE_FRAMES     4.0f           /* what history is worth at a moving edge: that of what turns is not where its surface was */
 #define COUNT_MAX       65536.0f       /* a frame's weight in a plain mean never gets below 1/COUNT_MAX */
 #define STILL           2.0f           /* the box is this much wider where nothing moves: jitter alone scatters colours */
-#define BOX_MIN         1e-6f          /* least half width of the colour box, radiance */
-
-static inline floatv tap(global const float *p, constant frame_t *f, int x, int y)
-{
-    return rl_load_edge(p, f, x, y);
-}
-
-static inline floatv far_if_empty(floatv z)
-{
-    return rl_select(FAR, z, z > 0.0f);
-}
-
-/* ---- the colours around the pixel ----------------------------------------------------------------------------- */
-
-static inline void to_ycocg(const floatv *rgb, floatv *out)
-{
-    floatv t = 0.25f * (rgb[0] + rgb[2]);
-    out[0] = fma(0.5f, rgb[1], t);
-    out[1] = 0.5f * (rgb[0] - rgb[2]);
-    out[2] = fma(0.5f, rgb[1], -t);
-}
-
-static inline void from_ycocg(const floatv *v, floatv *rgb)
-{
-    floatv t = v[0] - v[2];
-    rgb[0] = t + v[1];
-    rgb[1] = v[0] + v[2];
-    rgb[2] = t - v[1];
-}
-
-typedef struct box_t {
-    floatv middle[3], half_width[3]; /* YCoCg, relative to the pixel's own colour */
-    floatv brightest;                /* largest Y of the eight neighbours */
-} box_t;
-
-/* Mean and deviation of the 3x3 neighbourhood (Salvi 2016), around the pixel's own colour, which keeps the variance from
- * cancelling. The box is grown to contain that colour: a detail as small as a pixel would else be clipped away. */
-static inline void colour_box(box_t *b, constant frame_t *f, global const float *color, const floatv *own, int x, int y,
-                              floatv gamma)
-{
-    floatv sum[3] = {0.0f, 0.0f, 0.0f}, squares[3] = {0.0f, 0.0f, 0.0f}, brightest = 0.0f, own_y[3];
-    to_ycocg(own, own_y);
-#pragma unroll
-    for (int i = 0; i < 9; i++) {
-        if (i == 4)
-            continue;
-        floatv d[3], v[3];
-        for (int c = 0; c < 3; c++)
-            d[c] = tap(color + c * f->plane, f, x + i % 3 - 1, y + i / 3 - 1) - own[c];
-        to_ycocg(d, v);
-        brightest = fmax(brightest, v[0] + own_y[0]);
-        for (int c = 0; c < 3; c++) {
-            sum[c] += v[c];
-            squares[c] = fma(v[c], v[c], squares[c]);
-        }
-    }
-    for (int c = 0; c < 3; c++) {
-        floatv mean = sum[c] * (1.0f / 9);
-        floatv reach = gamma * sqrt(fmax(fma(-mean, mean, squares[c] * (1.0f / 9)), 0.0f));
-        floatv low = fmin(mean - reach, 0.0f), high = fmax(mean + reach, 0.0f);
-        b->middle[c] = 0.5f * (low + high);
-        b->half_width[c] = fmax(0.5f * (high - low), BOX_MIN);
-    }
-    b->brightest = brightest;
-}
-
-/* Moves the history towards the middle of the box until it is inside. */
-static inline void clip_to_box(const box_t *b, const floatv *own, floatv *history)
-{
-    floatv d[3], v[3], out = 1.0f;
-    for (int c = 0; c < 3; c++)
-        d[c] = history[c] - own[c];
-    to_ycocg(d, v);
-    for (int c = 0; c < 3; c++) {
-        v[c] -= b->middle[c];
-        out = fmax(out, fabs(v[c]) / b->half_width[c]);
-    }
-    intv outside = out > 1.0f;
-    for (int c = 0; c < 3; c++)
-        v[c] = v[c] / out + b->middle[c];
-    from_ycocg(v, d);
-    for (int c = 0; c < 3; c++)
-        history[c] = rl_select(history[c], own[c] + d[c], outside); /* inside: untouched */
-}
-
-/* Karis' 1 / (1 + luminance), of what exceeds twice the brightest neighbour: 1 but for fireflies. */
-static inline floatv firefly_weight(const box_t *b, const floatv *rgb)
-{
-    floatv luminance = fma(0.25f, rgb[0] + rgb[2], 0.5f * rgb[1]);
-    return 1.0f / (1.0f + fmax(luminance - 2.0f * b->brightest, 0.0f));
-}
 
 /* ---- where it was ---------------------------------------------------------------------------------------------- */
 
-/* previous view = m (3 rows of 3) * ray * depth + m[9…11], from this frame's view. Returns 0 when nothing changed. */
-static inline int camera_change(constant frame_t *f, float *m)
-{
-    constant camera_t *a = &f->camera, *b = &f->previous;
-    int same = a->focal[0] == b->focal[0] && a->focal[1] == b->focal[1] && a->centre[0] == b->centre[0] &&
-               a->centre[1] == b->centre[1];
-    for (int i = 0; i < 12; i++)
-        same = same && a->to_view[i] == b->to_view[i];
-    for (int i = 0; i < 3; i++) {
-        constant float *row = &b->to_view[4 * i];
-        for (int j = 0; j < 3; j++)
-            m[3 * i + j] = row[0] * a->to_world[j] + row[1] * a->to_world[4 + j] + row[2] * a->to_world[8 + j];
-        m[9 + i] = row[0] * a->to_world[3] + row[1] * a->to_world[7] + row[2] * a->to_world[11] + row[3];
-    }
-    return !same;
-}
-
-/* Displacement of what is seen at (x, y) at depth z, by the cameras alone; `closer` is previous depth / z. */
-static inline void follow(constant frame_t *f, const float *m, floatv x, floatv y, floatv z, floatv *dx, floatv *dy,
-                          floatv *closer)
-{
-    constant camera_t *a = &f->camera, *b = &f->previous;
-    float ox = (float)f->origin[0] + 0.5f + a->jitter[0], oy = (float)f->origin[1] + 0.5f + a->jitter[1];
-    floatv rx = (x + (ox - a->centre[0])) / a->focal[0], ry = -(y + (oy - a->centre[1])) / a->focal[1];
-    floatv near = 1.0f / z;
-    floatv vx = fma(m[0], rx, fma(m[1], ry, fma(m[9], near, (floatv)-m[2])));
-    floatv vy = fma(m[3], rx, fma(m[4], ry, fma(m[10], near, (floatv)-m[5])));
-    floatv vz = -fma(m[6], rx, fma(m[7], ry, fma(m[11], near, (floatv)-m[8])));
-    intv front = vz > 1e-6f; /* behind the previous camera: leads out of the image */
-    floatv scale = 1.0f / rl_select(1.0f, vz, front);
-    *dx = rl_select(1e9f, b->focal[0] * vx * scale - (x + (ox - b->centre[0])), front);
-    *dy = rl_select(1e9f, -b->focal[1] * vy * scale - (y + (oy - b->centre[1])), front);
-    *closer = vz;
-}
+typedef struct place_t {
+    floatv dx, dy; /* displacement, pixels */
+    floatv then;   /* depth that the pixel's own surface had, if only the camera moved */
+    intv alone;    /* nothing but the pixel's own surface in 3x3 */
+    intv edge;     /* another depth in 3x3 */
+    intv behind;   /* a closer surface in 3x3 */
+    intv follows;  /* … which moves otherwise than the pixel's own, and whose displacement this is */
+} place_t;
 
 static inline floatv snap(floatv d)
 {
@@ -142,46 +26,61 @@ static inline floatv snap(floatv d)
     return rl_select(d, whole, fabs(d - whole) < SNAP);
 }
 
-/* Displacement of the closest surface in 3x3 (Karis 2014), so that an edge moves as one; the depth that the pixel's own
- * surface had then, if only the camera moved. */
-static inline void find_displacement(constant frame_t *f, global const float *depth, global const float *motion, int x,
-                                     int y, floatv *dx, floatv *dy, floatv *then)
+/* The displacement of the pixel's own surface or, where another is in front of it in 3x3, of the closest (Karis 2014), so
+ * that an edge moves as one. On one and the same surface a neighbour's displacement would be wrong by a little in the same
+ * direction in every frame. */
+static inline void find_place(constant frame_t *f, global const float *depth, global const float *motion,
+                              global const uint *stencil, int x, int y, uintv id, place_t *p)
 {
     float m[12];
-    floatv own = far_if_empty(rl_load(depth, rl_index(f, x, y))), best = own, ox = 0.0f, oy = 0.0f;
     int moved = camera_change(f, m);
-    *then = own;
-    *dx = *dy = 0.0f;
+    floatv own = far_if_empty(rl_load(depth, rl_index(f, x, y))), best = own, last = own, ox = 0.0f, oy = 0.0f;
+    floatv near_dx = 0.0f, near_dy = 0.0f;
+    p->alone = (intv)-1;
+    p->then = own;
+    p->dx = p->dy = 0.0f;
 #if HAS_motion
-    *dx = tap(motion, f, x, y);
-    *dy = tap(motion + f->plane, f, x, y);
-#else
-    if (!moved)
-        return;
+    near_dx = p->dx = tap(motion, f, x, y);
+    near_dy = p->dy = tap(motion + f->plane, f, x, y);
 #endif
     for (int i = 0; i < 9; i++) {
         int nx = x + i % 3 - 1, ny = y + i / 3 - 1;
+        if (i == 4)
+            continue;
         floatv z = far_if_empty(tap(depth, f, nx, ny));
         intv closer = z < best;
-        best = rl_select(best, z, closer);
+        best = fmin(best, z);
+        last = fmax(last, z);
+#if HAS_stencil
+        p->alone &= rl_load_id_edge(stencil, f, nx, ny) == id;
+#endif
 #if HAS_motion
-        *dx = rl_select(*dx, tap(motion, f, nx, ny), closer);
-        *dy = rl_select(*dy, tap(motion + f->plane, f, nx, ny), closer);
+        near_dx = rl_select(near_dx, tap(motion, f, nx, ny), closer);
+        near_dy = rl_select(near_dy, tap(motion + f->plane, f, nx, ny), closer);
 #else
         ox = rl_select(ox, (floatv)(float)(i % 3 - 1), closer);
         oy = rl_select(oy, (floatv)(float)(i / 3 - 1), closer);
 #endif
     }
-    floatv px = rl_to_floatv(RL_LANES + x), py = (float)y, ratio, ignored_x, ignored_y;
-#if !HAS_motion
-    follow(f, m, px + ox, py + oy, best, dx, dy, &ratio);
+    p->edge = last > best * (1.0f + DEPTH_TOLERANCE);
+    p->alone &= ~p->edge;
+    p->behind = best < own * (1.0f - DEPTH_TOLERANCE);
+    p->follows = 0;
+    floatv px = rl_to_floatv(RL_LANES + x), py = (float)y, ratio = 1.0f, own_dx = p->dx, own_dy = p->dy, ignored;
+    if (moved)
+        follow(f, m, px, py, own, &own_dx, &own_dy, &ratio);
+    p->then = rl_select(FAR, own * ratio, own < FAR);
+#if HAS_motion
+    own_dx = p->dx;
+    own_dy = p->dy;
+#else
+    if (!moved)
+        return;
+    follow(f, m, px + ox, py + oy, best, &near_dx, &near_dy, &ignored);
 #endif
-    if (moved) {
-        follow(f, m, px, py, own, &ignored_x, &ignored_y, &ratio);
-        *then = rl_select(FAR, own * ratio, own < FAR);
-    }
-    *dx = snap(*dx);
-    *dy = snap(*dy);
+    p->follows = p->behind & (fmax(fabs(near_dx - own_dx), fabs(near_dy - own_dy)) > SLIDES);
+    p->dx = snap(rl_select(own_dx, near_dx, p->behind));
+    p->dy = snap(rl_select(own_dy, near_dy, p->behind));
 }
 
 /* ---- what was there -------------------------------------------------------------------------------------------- */
@@ -191,12 +90,32 @@ typedef struct history_t {
     global const uint *stencil;
 } history_t;
 
-/* Lanes whose surface is among those of the 3x3 history pixels around the place: the same material, and a depth between
- * the least and the largest that it has there. Bracketing makes slopes and jitter agree, but not another surface. */
-static inline intv same_surface(constant frame_t *f, const history_t *h, uintv id, floatv z, int x, int y, intv right,
+/* Lanes whose nearest history pixel is of their surface. */
+static inline intv nearest_same(constant frame_t *f, const history_t *h, uintv id, floatv z, int x, int y, intv right,
                                 intv below, int whole)
 {
-    floatv low = 2 * FAR, high = 0.0f;
+    intv same = 0;
+    for (int i = 0; i < (whole ? 1 : 4); i++) {
+        intv nearest = (i & 1 ? right : ~right) & (i & 2 ? below : ~below);
+#if HAS_stencil
+        nearest &= rl_load_id_edge(h->stencil, f, x + (i & 1), y + (i >> 1)) == id;
+#endif
+        floatv t = far_if_empty(tap(h->depth, f, x + (i & 1), y + (i >> 1)));
+        same |= nearest & (fabs(t - z) <= 2 * DEPTH_TOLERANCE * z);
+    }
+    return same;
+}
+
+/* Lanes of `mask` whose surface was at the place. Where a pixel is alone now no edge goes through it, and the nearest
+ * history pixel must be of its surface. Elsewhere that is a matter of jitter: the surface must be among those of the 3x3
+ * history pixels, of the same material and at a depth between the least and the largest that it has there. */
+static inline intv same_surface(constant frame_t *f, const history_t *h, uintv id, const place_t *p, intv mask, int x, int y,
+                                intv right, intv below, int whole)
+{
+    floatv low = 2 * FAR, high = 0.0f, z = p->then;
+    intv same = p->alone & nearest_same(f, h, id, z, x, y, right, below, whole);
+    if (!rl_any(mask & ~p->alone))
+        return same;
     for (int j = -1; j < 3 - whole; j++) {
         for (int i = -1; i < 3 - whole; i++) {
             intv use = (i == -1 ? ~right : i == 2 ? right : (intv)-1) & (j == -1 ? ~below : j == 2 ? below : (intv)-1);
@@ -208,40 +127,29 @@ static inline intv same_surface(constant frame_t *f, const history_t *h, uintv i
             high = rl_select(high, fmax(high, t), use);
         }
     }
-    return (z >= low * (1.0f - DEPTH_TOLERANCE)) & (z <= high * (1.0f + DEPTH_TOLERANCE));
+    return same | (~p->alone & (z >= low * (1.0f - DEPTH_TOLERANCE)) & (z <= high * (1.0f + DEPTH_TOLERANCE)));
 }
 
-/* Catmull-Rom weights for t in 0…1 between the second and the third sample. */
-static inline void catmull_rom(floatv t, floatv *w)
+/* The count is negative where a pixel followed the edge of another surface: what is there is not of its own surface's past,
+ * and is of no use once the edge has left. */
+static inline floatv nearest_count(constant frame_t *f, const history_t *h, int x, int y, intv right, intv below, int whole)
 {
-    w[0] = t * fma(t, fma(t, (floatv)-0.5f, 1.0f), -0.5f);
-    w[1] = fma(t * t, fma(t, (floatv)1.5f, -2.5f), 1.0f);
-    w[2] = t * fma(t, fma(t, (floatv)-1.5f, 2.0f), 0.5f);
-    w[3] = t * t * fma(t, (floatv)0.5f, -0.5f);
+    floatv n = tap(h->count, f, x, y);
+    if (whole)
+        return n;
+    n = rl_select(n, tap(h->count, f, x + 1, y), right & ~below);
+    n = rl_select(n, tap(h->count, f, x, y + 1), below & ~right);
+    return rl_select(n, tap(h->count, f, x + 1, y + 1), below & right);
 }
 
-/* History colour between pixels, 16 loads a channel. Ringing must not make light negative. */
-static inline void resample(constant frame_t *f, global const float *color, int x, int y, floatv tx, floatv ty,
-                            floatv *out)
+/* Lanes whose material is in the set. */
+static inline intv in_set(constant int *set, uintv id)
 {
-    floatv wx[4], wy[4];
-    catmull_rom(tx, wx);
-    catmull_rom(ty, wy);
-    for (int c = 0; c < 3; c++) {
-        floatv sum = 0.0f, least = 0.0f;
-#pragma unroll
-        for (int j = 0; j < 4; j++) {
-            floatv row = 0.0f;
-#pragma unroll
-            for (int i = 0; i < 4; i++) {
-                floatv v = tap(color + c * f->plane, f, x + i - 1, y + j - 1);
-                row = fma(wx[i], v, row);
-                least = fmin(least, v);
-            }
-            sum = fma(wy[j], row, sum);
-        }
-        out[c] = fmax(sum, least);
-    }
+    intv in = 0;
+    for (int i = 0; i < 8; i++)
+        if (set[i])
+            in |= (id >> 5 == (uint)i) & ((((uintv)(uint)set[i] >> (id & 31u)) & 1u) != 0u);
+    return in;
 }
 
 /* Lanes whose displacement leads into the image, and its whole part as one word that is never 0. */
@@ -266,41 +174,43 @@ kernel void taa(global const float *color, global const float *depth, global con
         own[c] = rl_load(color, at + c * f->plane);
     floatv result[3] = {own[0], own[1], own[2]};
     if (f->history && rl_any(rl_insidev(f, x, y))) {
-        floatv dx, dy, then;
+        place_t place;
         box_t box;
-        find_displacement(f, depth, motion, x, y, &dx, &dy, &then);
-        colour_box(&box, f, color, own, x, y, rl_select(p->clip_gamma, STILL * p->clip_gamma, (dx == 0.0f) & (dy == 0.0f)));
-        floatv tx = dx - floor(dx), ty = dy - floor(dy);
-        intv right = tx > 0.5f, below = ty > 0.5f;
-        uintv id = 0, key = displacement_key(f, x, y, dx, dy);
+        uintv id = 0;
 #if HAS_stencil
         id = rl_load_id(stencil, at);
 #endif
+        find_place(f, depth, motion, stencil, x, y, id, &place);
+        floatv dx = place.dx, dy = place.dy;
+        intv still = (dx == 0.0f) & (dy == 0.0f);
+        colour_box(&box, f, color, own, x, y, rl_select(p->clip_gamma, STILL * p->clip_gamma, still));
+        floatv tx = dx - floor(dx), ty = dy - floor(dy);
+        intv right = tx > 0.5f, below = ty > 0.5f;
+        uintv key = displacement_key(f, x, y, dx, dy) & ~rl_as_uintv(in_set(p->exclude, id));
         for (uint now = rl_max_id(key); now; now = rl_max_id(key)) {
             intv mask = key == now;
             key = select(key, (uintv)0, mask);
             int hx = x + (int)(now >> 16) - 32768, hy = y + (int)(now & 65535) - 32768;
             int whole = !rl_any(mask & ((tx != 0.0f) | (ty != 0.0f)));
-            mask &= same_surface(f, &h, id, then, hx, hy, right, below, whole);
+            mask &= same_surface(f, &h, id, &place, mask, hx, hy, right, below, whole);
+            floatv past[3], n = nearest_count(f, &h, hx, hy, right, below, whole);
+            mask &= ~((n < 0.0f) & (place.alone | (place.behind & ~place.follows)));
             if (!rl_any(mask))
                 continue;
-            floatv past[3], n = tap(h.count, f, hx, hy);
-            if (whole) {
+            n = rl_select(fabs(n), fmin(fabs(n), EDGE_FRAMES), place.edge & ~still);
+            if (whole)
                 for (int c = 0; c < 3; c++)
                     past[c] = tap(h.color + c * f->plane, f, hx, hy);
-            } else {
-                floatv n_right = tap(h.count, f, hx + 1, hy), n_below = tap(h.count, f, hx, hy + 1);
-                n = rl_select(rl_select(n, n_right, right),
-                              rl_select(n_below, tap(h.count, f, hx + 1, hy + 1), right), below);
+            else
                 resample(f, h.color, hx, hy, tx, ty, past);
-            }
             clip_to_box(&box, own, past);
             floatv alpha = fmax(1.0f / (1.0f + n), p->blend);
             floatv w = alpha * firefly_weight(&box, own), w_past = (1.0f - alpha) * firefly_weight(&box, past);
             floatv share = w / (w + w_past);
             for (int c = 0; c < 3; c++)
                 result[c] = rl_select(result[c], fma(own[c] - past[c], share, past[c]), mask);
-            count = rl_select(count, fmin(n + 1.0f, COUNT_MAX), mask);
+            n = fmin(n + 1.0f, COUNT_MAX);
+            count = rl_select(count, rl_select(n, -n, place.follows), mask);
         }
     }
     for (int c = 0; c < 3; c++)

@@ -1,7 +1,9 @@
-/* Direct light on the G-buffer: point, spot and directional lights, Lambert's or Disney's diffuse
+/* Light on the G-buffer: point, spot and directional lights, unshadowed ambient light, Lambert's or Disney's diffuse
  * transmission, GGX specular, translucency through a slab.
  *
  * Golubev 2018 (transmission at entry and exit, texturing modes, thin and thick slabs), Helix (Beer-Lambert),
+ * MJP (scattering as spherical Gaussians: the irradiance is complete, and goes into `lit`), Ramamoorthi and Hanrahan 2001
+ * (irradiance of spherical harmonics),
  * Walter 2007 and Heitz 2014 (GGX, height-correlated Smith), Schlick 1994 (Fresnel). */
 #include "passes/shading_rows.h"
 
@@ -16,6 +18,9 @@ static const rl_param profile_keys[] = {
     M(RL_RGBF, transmittance_color, 1e-6, 1, 0.5, "ratio",
       "beer_lambert: what is left of white light after transmittance_distance_mm", .source = "Bavoil, Helix"),
     M(RL_F32, transmittance_distance_mm, 1e-3, 1e6, 1, "mm", "beer_lambert: where transmittance_color holds"),
+    M(RL_RGBF, sg_variance_mm2, 1e-8, 1e8, -1, "mm2",
+      "diffuse: sg: variance of the scattering along an axis; not given: 7 d^2, that of Burley's profile",
+      .source = "MJP", .no_default = true, .needed_by = "diffuse: sg", .instead = "scatter_distance_mm"),
 };
 
 static const rl_param material_keys[] = {
@@ -27,6 +32,9 @@ static const rl_param material_keys[] = {
     M(RL_F32, metallic, 0, 1, -1, "ratio",
       "1: albedo is the specular colour and nothing is diffuse; not given: the metallic layer, else 0",
       .no_default = true),
+    M(RL_F32, normal_detail_mm, 0, 1e4, 3, "mm",
+      "diffuse: sg: size of the bumps that smooth_normal leaves out, as a standard deviation",
+      .source = "d'Eon and Luebke 2007; MJP"),
 };
 
 static const rl_param shading_keys[] = {
@@ -50,6 +58,9 @@ static const rl_port ports[] = {
     {"specular", RL_READ, RL_SCALAR, .help = "reflectance at normal incidence, 0 to 1", .optional = true},
     {"metallic", RL_READ, RL_SCALAR, .help = "0 to 1", .optional = true},
     {"emission", RL_READ, RL_RGB, .help = "emitted radiance", .optional = true},
+    {"curvature", RL_READ, RL_SCALAR, .help = "1/m; only its amount counts, hollows scatter like hills",
+     .optional = true, .needed_by = "diffuse: sg"},
+    {"smooth_normal", RL_READ, RL_NORMAL, .help = "diffuse: sg: normal without small bumps", .optional = true},
     {"diffuse", RL_WRITE, RL_RGB, .help = "radiance that entered a subsurface material", .any_layout = true},
     {"lit", RL_WRITE, RL_RGB, .help = "all other radiance, complete"},
 };
@@ -58,13 +69,15 @@ static const rl_step steps[] = {{"lighting", .domain = RL_EVERY_VECTOR}};
 
 const rl_pass rl_pass_lighting = {
     .name = "lighting",
-    .help = "direct light: diffuse transmission, specular reflection, translucency",
+    .help = "direct and ambient light: diffuse transmission, specular reflection, translucency",
     .source = "Golubev 2018; Helix; Walter 2007; Heitz 2014",
     .kernel = "lighting.cl",
+    .kernel_prelude = "sg.cl surface.cl sg_shade.cl",
     .profile_keys = RL_ARRAY(profile_keys),
     .material_keys = RL_ARRAY(material_keys),
     .shading_keys = RL_ARRAY(shading_keys),
     .ports = RL_ARRAY(ports),
     .steps = RL_ARRAY(steps),
     .lights = true,
+    .ambient = true,
 };

@@ -17,8 +17,9 @@
     M_ENUM(border, "renormalize|occlude", 0,                                                                 \
            "samples of other materials and outside of the image: not counted, or black")
 #define RL_ROW_DIFFUSE                                                                                       \
-    M_ENUM(diffuse, "disney|lambert", 0, "how light crosses the surface, on the way in and on the way out",  \
-           .source = "Burley 2015")
+    M_ENUM(diffuse, "disney|lambert|sg", 0,                                                                  \
+           "how light crosses the surface, in and out; sg: as lambert, and profiles scatter in the lighting",  \
+           .source = "Burley 2015; MJP")
 #define RL_ROW_EXIT_TRANSMISSION                                                                             \
     M_ENUM(exit_transmission, "sss|lighting", 0,                                                             \
            "where the way out is applied: behind the filter, or before it as in the talk",                   \

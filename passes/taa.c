@@ -8,6 +8,7 @@
 typedef struct taa_params {
     float blend;
     float clip_gamma;
+    uint32_t exclude[RL_SET_WORDS];
 } taa_params;
 
 static const rl_param params[] = {
@@ -15,21 +16,23 @@ static const rl_param params[] = {
     P(taa_params, RL_F32, clip_gamma, 0, 8, 1, "stddev",
       "half width of the colour box that the history is clipped to; doubled where nothing moves",
       .source = "Salvi 2016"),
+    P_MATERIALS(taa_params, exclude, "what is not accumulated: always the current frame"),
 };
-RL_PARAMS_MATCH(taa_params, 2);
+RL_PARAMS_MATCH(taa_params, 2 + RL_SET_WORDS);
 
 static const rl_port ports[] = {
     {"color", RL_READ, RL_RGB, .help = "this frame, scene-linear"},
     {"depth", RL_READ, RL_SCALAR, .help = "planar, metres"},
     {"motion", RL_READ, RL_VEC2, .help = "pixels to the same point one frame before; else depth and cameras",
-     .optional = true},
+     .optional = true,
+     .if_absent = "motion comes from depth and the cameras, which do not know of what moves by itself"},
     {"stencil", RL_READ, RL_ID, .help = "material, to reject history of another", .optional = true},
     {"last_color", RL_HISTORY, RL_RGB, .of = "color", .help = "the previous result"},
     {"last_depth", RL_HISTORY, RL_SCALAR, .of = "depth", .help = "the previous depth"},
     {"last_stencil", RL_HISTORY, RL_ID, .of = "stencil", .help = "the previous materials", .optional = true},
     {"last_count", RL_HISTORY, RL_SCALAR, .of = "count", .help = "frames in the previous result"},
     {"color", RL_WRITE, RL_RGB, .help = "anti-aliased, scene-linear"},
-    {"count", RL_WRITE, RL_SCALAR, .help = "frames that the pixel consists of, this one included"},
+    {"count", RL_WRITE, RL_SCALAR, .help = "frames that the pixel consists of, this one included; negative where it follows an edge before it"},
 };
 
 static const rl_step steps[] = {{"taa", .domain = RL_EVERY_VECTOR}};
@@ -44,6 +47,7 @@ const rl_pass rl_pass_taa = {
     .help = "temporal anti-aliasing with variance clipping",
     .source = "Salvi 2016; Karis 2014; Yang et al. 2020",
     .kernel = "taa.cl",
+    .kernel_prelude = "temporal.cl",
     .params = RL_ARRAY(params),
     .params_size = sizeof(taa_params),
     .ports = RL_ARRAY(ports),

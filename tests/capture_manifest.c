@@ -107,8 +107,8 @@ static void print_layers(rl_str *y, const capture_form *f)
 
 static void print_files(rl_str *y, const capture_form *f)
 {
-    if (f->files != FILES_LAYERS) {
-        rl_str_add(y, "files: cap.####.exr\n");
+    if (f->files != FILES_LAYERS || f->pattern) {
+        rl_str_printf(y, "files: %s\n", f->pattern ? f->pattern : "cap.####.exr");
         return;
     }
     rl_str_add(y, "files:\n");

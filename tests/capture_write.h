@@ -19,6 +19,7 @@ typedef struct capture_form {
     const char *name;  /* for people */
     const char *title; /* the manifest's `name`; NULL: cap */
     capture_files files;
+    const char *pattern;  /* the manifest's `files`; NULL: what fits */
     rl_exr_pixel pixel;   /* RL_EXR_HALF, else float */
     rl_exr_pixel stencil; /* 0 is RL_EXR_UINT */
     bool depth_uint;      /* depth as whole numbers of the unit */

@@ -23,7 +23,7 @@ static void add_field(rl_str *s, const char *group, const rl_param *row)
 {
     const char *type = row->type == RL_F32 || row->type == RL_RGBF ? "float" : "int";
     rl_str_printf(s, "%s %s%s%s%s; ", type, group, *group ? "_" : "", row->name,
-                  row->type == RL_RGBF ? "[3]" : "");
+                  row->type == RL_RGBF ? "[3]" : row->type == RL_MATERIALS ? "[8]" : "");
 }
 
 static bool add_row(void *ctx, const char *group, const rl_param *row, size_t word)
@@ -77,6 +77,20 @@ static bool add_file(rl_str *s, const char *path)
     rl_str_addn(s, text, size);
     rl_free(text);
     return true;
+}
+
+/* Names separated by spaces; NULL = none. */
+static bool add_preludes(rl_str *s, const char *names)
+{
+    bool ok = true;
+    while (names && *names && ok) {
+        char path[256];
+        int n = (int)strcspn(names, " ");
+        snprintf(path, sizeof path, "kernels/%.*s", n, names);
+        ok = add_file(s, path);
+        names += n + (int)strspn(names + n, " ");
+    }
+    return ok;
 }
 
 /* ---- the device ------------------------------------------------------------------------------------------
@@ -197,7 +211,10 @@ static bool add_arguments(launch *l, const shade_run *run)
     if (!add_buffer(l, &run->frame, sizeof run->frame) || !add_materials(l, run->materials))
         return false;
     size_t n = run->frame.lights > 0 ? (size_t)run->frame.lights : 1;
-    return !pass->lights || add_buffer(l, run->frame.lights ? run->lights : &none, n * sizeof(light_t));
+    const ambient_t dark = {0};
+    if (pass->lights && !add_buffer(l, run->frame.lights ? run->lights : &none, n * sizeof(light_t)))
+        return false;
+    return !pass->ambient || add_buffer(l, run->ambient ? run->ambient : &dark, sizeof dark);
 }
 
 static int lanes_of(const shade_run *run)
@@ -255,7 +272,7 @@ bool shade_execute(shade_run *run)
     snprintf(path, sizeof path, "kernels/%s", run->pass->kernel);
     add_prelude(&text, run);
     if (!shade_device() || !add_file(&text, "kernels/shared.h") || !add_file(&text, "kernels/common.cl") ||
-        !add_file(&text, path))
+        !add_preludes(&text, run->pass->kernel_prelude) || !add_file(&text, path))
         goto done;
     l.program = build(rl_str_text(&text), lanes_of(run));
     if (!l.program)

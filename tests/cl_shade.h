@@ -31,6 +31,7 @@ typedef struct shade_run {
     bool phase4[SHADE_PORTS];               /* any_layout outputs: ask the kernel for RL_PHASE4 */
     const shade_materials *materials;
     const light_t *lights; /* frame.lights of them */
+    const ambient_t *ambient; /* NULL = none */
     int lanes;             /* RL_W; 0 = 16 */
     int repeat;            /* for timings: runs beyond the first */
     double best_ms;        /* out: the fastest run */

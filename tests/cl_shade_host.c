@@ -191,7 +191,7 @@ void shade_params_default(const rl_pass *pass, void *params)
     for (size_t r = 0; r < pass->params.n; r++) {
         const rl_param *row = &pass->params.rows[r];
         for (size_t i = 0; i < RL_PARAM_BYTES(row->type) / 4; i++) {
-            uint32_t word = to_word(row->type, row->def[i]);
+            uint32_t word = row->type == RL_MATERIALS ? 0 : to_word(row->type, row->def[i]);
             memcpy((char *)params + row->offset + 4 * i, &word, 4);
         }
     }

@@ -18,14 +18,14 @@ typedef struct made_channel {
 
 /* What a header says beyond the pixels; every attribute is written only when it is asked for. */
 typedef struct made_header {
-    int display[4];              /* x, y, width, height; width 0 = the data window */
-    float screen_width, aspect;  /* 0 means 1 */
+    int display[4];             /* x, y, width, height; width 0 = the data window */
+    float screen_width, aspect; /* 0 means 1 */
     float screen_center[2];
-    const float *matrix;         /* worldToCamera, 16 numbers for row vectors */
-    float fov_x;                 /* camera:fovx, radians */
-    const float *jitter;         /* camera:jitter */
-    uint32_t time_code[2];       /* the second word is the user's */
-    int fps[2];                  /* framesPerSecond */
+    const float *matrix;   /* worldToCamera, 16 numbers for row vectors */
+    float fov_x;           /* camera:fovx, radians */
+    const float *jitter;   /* camera:jitter */
+    uint32_t time_code[2]; /* the second word is the user's */
+    int fps[2];            /* framesPerSecond */
     const char *owner;
 } made_header;
 

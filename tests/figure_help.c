@@ -181,9 +181,11 @@ shade_run figure_combine(const figure_frame *f)
 /* ---- the engine -------------------------------------------------------------------------------------------
  */
 
-rl_session *figure_open(const char *pipeline)
+rl_session *figure_open(const char *pipeline, rl_setting set)
 {
-    rl_options options = {.pipeline_text = pipeline};
+    static rl_setting kept; /* lives as long as the session */
+    kept = set;
+    rl_options options = {.pipeline_text = pipeline, .settings = &kept, .n_settings = kept.path ? 1 : 0};
     rl_session *s = NULL;
     rl_error err = {0};
     if (rl_session_open(&options, &s, &err))

@@ -24,8 +24,9 @@ void figure_frame_free(figure_frame *f);
 shade_run figure_lighting(const figure_frame *f);
 shade_run figure_combine(const figure_frame *f);
 
-/* A session on a pipeline's text, relative to the project's folder. */
-rl_session *figure_open(const char *pipeline);
+/* A session on a pipeline's text, relative to the project's folder; one value may be set (or path is NULL).
+ */
+rl_session *figure_open(const char *pipeline, rl_setting set);
 void figure_process(rl_session *s, long long frame, const rl_frame_data *data);
 rl_image_view figure_image(rl_session *s, const char *name);
 

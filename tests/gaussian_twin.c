@@ -70,6 +70,7 @@ static void add_sample(const job *j, int x, int y, int sx, int sy, int g, mean *
     if (far2 > reach * reach)
         return;
     double w = exp(-far2 / (2e-6 * (double)m->variance_mm2[g]));
+    w *= twin_area(s, same ? sx : x, same ? sy : y);
     sum->weight += w;
     sum->doubt |= same && j->light_doubt[index_of(s, sx, sy)];
     for (size_t c = 0; c < 3 && same; c++)

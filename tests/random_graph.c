@@ -137,7 +137,7 @@ static void make_node(maker *m, size_t index, rl_node *node)
         .name = "random", .ports = {ports,        n },
              .steps = { steps, 1 + below(m, 3)}
     };
-    *node = (rl_node){numbered(m, "n", index), RL_NOWHERE, pass, NULL, inputs, n_inputs};
+    *node = (rl_node){numbered(m, "n", index), RL_NOWHERE, pass, NULL, inputs, n_inputs, NULL};
     for (size_t p = 0; p < n; p++)
         if (ports[p].role == RL_WRITE) {
             const char *name = rl_arena_printf(m->arena, "%s.%s", node->name, ports[p].name);

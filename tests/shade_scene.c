@@ -7,7 +7,7 @@ extern const rl_pass rl_pass_lighting;
 extern const rl_pass rl_pass_combine;
 
 static const rl_pass *const shading_passes[] = {&rl_pass_lighting, &rl_pass_combine};
-static const int planes[LIGHTING_PORTS] = {3, 3, 1, 1, 1, SCENE_LIGHTS, SCENE_LIGHTS, 1, 1, 1, 3, 3, 3};
+static const int planes[LIGHTING_PORTS] = {3, 3, 1, 1, 1, SCENE_LIGHTS, SCENE_LIGHTS, 1, 1, 1, 3, 1, 3, 3, 3};
 
 void shade_camera(camera_t *c, const double *eye, double turn, double tilt)
 {
@@ -48,7 +48,10 @@ static void make_materials(shade_materials *m, uint64_t *seed)
         set(m, id, "profile", "transmission", i % 4);
         set(m, id, "profile", "thickness_from", i % 3);
         set(m, id, "profile", "transmittance_distance_mm", 2 + i);
-        set(m, id, "shading", "diffuse", i / 2 & 1);
+        set(m, id, "shading", "diffuse", i % 6 == 4 ? 2 : i / 2 & 1);
+        if (i % 3 == 1)
+            shade_material_set(m, id, "profile", "sg_variance_mm2", (double[]){30, 4 + i, 1});
+        set(m, id, "material", "normal_detail_mm", 0.3 * i);
         set(m, id, "shading", "specular", i % 5 == 4);
         set(m, id, "shading", "exit_transmission", i / 3 & 1);
         shade_material_set(m, id, "profile", "scatter_distance_mm", (double[]){3, 1.2 + i, 0.7});
@@ -100,6 +103,12 @@ static void make_pixel(const shade_scene *s, int x, int y, uint64_t *seed)
         *shade_at(&s->images[LIGHTING_SHADOW], f, l, x, y) = (float)(dark < 0.3 ? 0 : dark);
         *shade_at(&s->images[LIGHTING_SHADOW_THICKNESS], f, l, x, y) = (float)(dark < 0.7 ? occluder : 0);
     }
+    float smooth[3];
+    random_unit(seed, smooth);
+    for (int c = 0; c < 3; c++)
+        *shade_at(&s->images[LIGHTING_SMOOTH_NORMAL], f, c, x, y) = smooth[c];
+    double bend = shade_random(seed) - 0.3; /* radii of 0.4 mm to 1 m, hollows, planes */
+    *shade_at(&s->images[LIGHTING_CURVATURE], f, 0, x, y) = (float)(bend < -0.2 ? 0 : 2000 * bend * bend * bend);
     int patch = (x / 7) * 31 + (y / 5) * 17;
     uint32_t id = patch % 8 == 0 || shade_random(seed) < 1.0 / 16 ? 0 : 1 + (uint32_t)(patch % 13);
     shade_set_id(&s->images[LIGHTING_STENCIL], f, x, y, id);

@@ -22,7 +22,8 @@ typedef struct twin_scene {
     const twin_material *materials;
     const float *diffuse, *lit, *albedo, *normal, *depth;
     const uint32_t *stencil;
-    bool area;    /* weighting: area */
+    bool area;    /* weighting: area or surface */
+    bool surface; /* weighting: surface */
     bool tangent; /* orientation: tangent */
     int rotation; /* of sss_burley */
 } twin_scene;
@@ -30,6 +31,9 @@ enum { TWIN_STILL = 0, TWIN_WHITE = 1, TWIN_IGN = 2, TWIN_BLUE = 3 };
 
 /* lit + filtered · exit · F_out at pixel (x, y), from the filtered radiance. */
 void twin_resolve(const twin_scene *s, int x, int y, const double filtered[3], double color[3]);
+
+/* The surface that a pixel sees, up to a factor; 1 with weighting: plain. */
+double twin_area(const twin_scene *s, int x, int y);
 
 /* The dense sum. */
 void twin_reference(const twin_scene *s, int x, int y, double filtered[3]);

@@ -181,6 +181,9 @@ static void test_wrong_ids(void **state)
     refuse("materials: {plastre: {}}",
            "t.yaml:1:13: error: material 'plastre' needs 'stencil' (an id): the capture names "
            "no id like it; did you mean 'plaster'? known: plaster, skin, wax");
+    const rl_materials *absent; /* unlike any name: not in this capture, which is no mistake */
+    assert_int_equal(resolve_used("materials: {jade: {}}", 3, 2, &absent), RL_OK);
+    assert_int_equal(absent->n_ids, 0);
     refuse("materials: {default: {stencil: 1}}",
            "t.yaml:1:32: error: material 'default' is for every id that no other "
            "material covers: it takes no 'stencil'");

@@ -12,6 +12,7 @@
 #include <string.h>
 
 #include "graph/run/image_file.h"
+#include "tests/capture_run.h"
 #include "tests/output_run.h"
 #include "tests/tool_run.h"
 
@@ -92,12 +93,12 @@ static void test_single_letters(void **state)
     (void)state;
     rl_str text = {0};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++)
-        rl_str_printf(&text, "\n  o%zu: {image: %s, file: \"sub/%zu.exr\"}", i, all[i].image, i);
+        rl_str_printf(&text, "\n  o%zu: {image: %s, file: \"sub/%zu.EXR\"}", i, all[i].image, i);
     char *out = output_run(text.text, NULL, NULL);
     for (size_t i = 0; i < sizeof all / sizeof *all; i++) {
         char name[32];
         rl_exr_value v;
-        snprintf(name, sizeof name, "sub/%zu.exr", i);
+        snprintf(name, sizeof name, "sub/%zu.EXR", i);
         rl_exr *f = output_open(out, name);
         expect_channels(f, all[i].channels);
         assert_true(rl_exr_attr(f, 0, "chromaticities", &v) == (i == 0)); /* only colours have primaries */
@@ -107,6 +108,35 @@ static void test_single_letters(void **state)
     }
     rl_str_free(&text);
     folder_remove(out);
+}
+
+static void expect_refused(const char *outputs, const char *text)
+{
+    const char *before = strstr(capture_pipeline, "outputs:");
+    rl_str p = {0};
+    rl_session *s = NULL;
+    rl_error err = {0};
+    rl_str_printf(&p, "%.*soutputs: {o: {%s}}\ncapture: {files: memory, preset: relit}\nlights: {}\n",
+                  (int)(before - capture_pipeline), capture_pipeline, outputs);
+    rl_options options = {.pipeline_text = p.text};
+    assert_int_equal(rl_session_open(&options, &s, &err), RL_E_CONFIG);
+    if (!strstr(err.text, text))
+        fail_msg("\"%s\" is not in \"%s\"", text, err.text);
+    rl_str_free(&p);
+}
+
+static void test_refused(void **state)
+{
+    (void)state;
+    expect_refused("image: capture.stencil, file: a.png",
+                   "a .png file cannot hold 'capture.stencil' (id, 1 plane); write .exr");
+    expect_refused("image: capture.motion, file: a.TIF",
+                   "a .TIF file cannot hold 'capture.motion' (vec2, 2 planes)");
+    expect_refused("image: capture.depth, file: a.exr, display: sRGB",
+                   "only rgb images are colour-converted, 'capture.depth' is scalar");
+    expect_refused("image: capture.normal, file: a.exr, exposure: 1",
+                   "leave out colorspace, display, view, look and exposure");
+    expect_refused("layers: {a: c.color, b: c.color}, file: a.png", "a .png file holds one image");
 }
 
 /* ---- headers ---- */
@@ -211,10 +241,8 @@ static void test_crop(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_letters),
-        cmocka_unit_test(test_single_letters),
-        cmocka_unit_test(test_header),
-        cmocka_unit_test(test_crop),
+        cmocka_unit_test(test_letters), cmocka_unit_test(test_single_letters), cmocka_unit_test(test_refused),
+        cmocka_unit_test(test_header),  cmocka_unit_test(test_crop),
     };
     return cmocka_run_group_tests(tests, output_setup, output_teardown);
 }

@@ -114,7 +114,7 @@ static void test_wrong_sections(void **state)
     refuse("3",
            "t.yaml:1:1: error: 'pipeline': expected a map that starts with 'relit: 1', found the number '3'");
     refuse("{relit: 1, output: {}}", "t.yaml:1:12: error: a pipeline has no key 'output'; did you mean "
-                                     "'outputs'? known: capture, color, graph, "
+                                     "'outputs'? known: ambient, capture, color, graph, "
                                      "lights, materials, outputs, profiles, relit, shading");
     refuse("{relit: 1, include: a.yaml}", "t.yaml:1:21: error: 'include' works in a file only");
     refuse("{relit: 1, capture: [a.exr]}",

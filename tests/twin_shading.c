@@ -9,10 +9,13 @@ typedef struct twin_material {
     bool has_profile;
     int texturing, transmission, thickness_from, diffuse, specular_lobe, transmits, exit_transmission;
     double distance_mm[3], color[3], color_mm, roughness, specular, metallic;
+    double variance_mm2[3], detail_mm;
 } twin_material;
 
 typedef struct twin_pixel {
     double albedo[3], n[3], w[3], v[3], z, thickness, roughness, specular, metallic;
+    double curvature, smooth[3], pixel_mm;
+    bool has_smooth;
 } twin_pixel;
 
 static double get(const shade_materials *m, size_t id, const char *group, const char *key)
@@ -38,6 +41,11 @@ static twin_material load_material(const shade_materials *m, size_t id)
     t.roughness = get(m, id, "material", "roughness");
     t.specular = get(m, id, "material", "specular");
     t.metallic = get(m, id, "material", "metallic");
+    t.detail_mm = get(m, id, "material", "normal_detail_mm");
+    shade_material_get(m, id, "profile", "sg_variance_mm2", t.variance_mm2);
+    for (int c = 0; c < 3; c++)
+        if (t.variance_mm2[c] < 0)
+            t.variance_mm2[c] = 7 * t.distance_mm[c] * t.distance_mm[c];
     return t;
 }
 
@@ -53,7 +61,7 @@ static double saturate(double x)
 
 static double transmit(int diffuse, double c)
 {
-    return diffuse == 1 ? 1 : 1 - 0.5 * pow(fmax(1 - fabs(c), 0), 5);
+    return diffuse >= 1 ? 1 : 1 - 0.5 * pow(fmax(1 - fabs(c), 0), 5);
 }
 
 void twin_ray(const frame_t *f, const camera_t *c, double x, double y, double *view, double *world)
@@ -79,8 +87,12 @@ static twin_pixel load_pixel(const shade_run *run, int x, int y)
         p.albedo[c] = sample(run, LIGHTING_ALBEDO, c, x, y, 0);
         p.n[c] = sample(run, LIGHTING_NORMAL, c, x, y, 0);
         p.v[c] = -p.w[c] / sqrt(dot(p.w, p.w));
+        p.smooth[c] = sample(run, LIGHTING_SMOOTH_NORMAL, c, x, y, 0);
     }
+    p.has_smooth = run->images[LIGHTING_SMOOTH_NORMAL] != NULL;
+    p.curvature = sample(run, LIGHTING_CURVATURE, 0, x, y, 0);
     p.z = sample(run, LIGHTING_DEPTH, 0, x, y, 0);
+    p.pixel_mm = 1000 * p.z / run->frame.camera.focal[0];
     p.thickness = sample(run, LIGHTING_THICKNESS, 0, x, y, 0);
     p.roughness = sample(run, LIGHTING_ROUGHNESS, 0, x, y, 0.5);
     p.specular = sample(run, LIGHTING_SPECULAR, 0, x, y, 0.04f);
@@ -146,6 +158,37 @@ static double through(const twin_material *m, const twin_pixel *p, int channel, 
     return visibility * 0.25 * (exp(-s * t) + 3 * exp(-s * t / 3));
 }
 
+double twin_sg_irradiance(double lambda, double mu)
+{
+    double e = exp(-lambda), c0 = 0.36, c1 = 1 / (4 * c0);
+    if (lambda < 0.1)
+        return 0.25 + lambda * mu / 6;
+    double scale = 1 + e * e - (1 - e * e) / lambda, bias = (e - e * e) / lambda - e * e;
+    double x = sqrt((1 - e * e) / lambda - e * e);
+    double y = fabs(c0 * mu) <= c1 * x ? (c0 * mu + c1 * x) * (c0 * mu + c1 * x) / x : saturate(mu);
+    return (scale * y + bias) / (1 - e * e);
+}
+
+static bool is_sg(const shade_run *run, const twin_material *m)
+{
+    return m->diffuse == 2 && m->has_profile && run->images[LIGHTING_CURVATURE];
+}
+
+/* Irradiance of a unit light of direction l, per channel, with visibility. */
+static double scattered(const twin_material *m, const twin_pixel *p, int channel, const double *l, double nl,
+                        double shadow, const float *shadow_thickness)
+{
+    double v = m->variance_mm2[channel], n[3], u = m->detail_mm * m->detail_mm + p->pixel_mm * p->pixel_mm / 12;
+    double keep = p->has_smooth ? u / (u + v) : 1, r_mm = 1000 / fmax(fabs(p->curvature), 1e-6);
+    for (int i = 0; i < 3; i++)
+        n[i] = p->smooth[i] + keep * (p->n[i] - p->smooth[i]);
+    double length = fmax(sqrt(dot(n, n)), 1e-6), lambda = fmin(fmax(r_mm * r_mm / v, 1e-3), 1e4);
+    if (shadow_thickness && *shadow_thickness > 0 &&
+        *shadow_thickness <= 4e-3 * r_mm * fmax(-nl, 0) + 1e-3)
+        shadow = 1;
+    return shadow * twin_sg_irradiance(lambda, dot(n, l) / length);
+}
+
 static void add_light(const shade_run *run, const light_t *light, const twin_material *m, const twin_pixel *p,
                       int x, int y, double *sum, double *specular)
 {
@@ -158,8 +201,11 @@ static void add_light(const shade_run *run, const light_t *light, const twin_mat
     for (int c = 0; c < 3; c++) {
         double e = light->intensity[c] * falloff,
                f0 = p->specular + p->metallic * (p->albedo[c] - p->specular);
-        if (nl > 0) {
+        if (is_sg(run, m))
+            sum[c] += e * scattered(m, p, c, l, nl, shadow, st);
+        else if (nl > 0)
             sum[c] += e * nl * shadow * transmit(m->diffuse, nl);
+        if (nl > 0) {
             if (m->specular_lobe == 0)
                 specular[c] += e * nl * shadow * lobe(p, l, p->roughness, f0);
         } else if (m->has_profile && m->transmits && m->transmission) {
@@ -185,7 +231,7 @@ void twin_lighting(const shade_run *run, int x, int y, double *diffuse, double *
         add_light(run, &run->lights[i], &m, &p, x, y, sum, lit);
     for (int c = 0; c < 3; c++) {
         double value = sum[c] / pi * (1 - p.metallic), f_out = transmit(m.diffuse, dot(p.n, p.v));
-        if (!m.has_profile)
+        if (!m.has_profile || is_sg(run, &m))
             lit[c] += value * p.albedo[c] * f_out;
         else
             diffuse[c] = value * (m.texturing ? sqrt(p.albedo[c]) : 1) * (m.exit_transmission ? f_out : 1);

@@ -17,6 +17,8 @@ enum {
     LIGHTING_SPECULAR,
     LIGHTING_METALLIC,
     LIGHTING_EMISSION,
+    LIGHTING_CURVATURE,
+    LIGHTING_SMOOTH_NORMAL,
     LIGHTING_DIFFUSE,
     LIGHTING_LIT,
     LIGHTING_PORTS
@@ -35,6 +37,9 @@ enum {
 
 /* Inputs are read from run->images; diffuse and lit get three numbers each. */
 void twin_lighting(const shade_run *run, int x, int y, double *diffuse, double *lit);
+
+/* Irradiance of the normalized spherical Gaussian of DESIGN 4.4, mu = axis.n, as it is printed there. */
+double twin_sg_irradiance(double lambda, double mu);
 
 /* `inputs` is a run of combine (albedo, normal, stencil are read); diffuse and lit are given. */
 void twin_combine(const shade_run *inputs, int x, int y, const double *diffuse, const double *lit,

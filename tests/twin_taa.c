@@ -100,47 +100,75 @@ static void follow(const frame_t *f, int x, int y, double z, double *d, double *
         d[0] = d[1] = same ? 0 : 1e9;
 }
 
-static void displacement(const shade_run *run, int x, int y, double *d, double *then)
+typedef struct place {
+    double d[2], then;
+    bool alone, edge, behind, follows, still;
+} place;
+
+/* A displacement that rounding has touched is whole. */
+static double snap(double d)
 {
-    double own = depth_at(run, TAA_DEPTH, x, y), best = own, ignored;
+    return fabs(d - floor(d + 0.5)) < 1.0 / 1024 ? floor(d + 0.5) : d;
+}
+
+static place find_place(const shade_run *run, int x, int y)
+{
+    place p = {.alone = true};
+    double own = depth_at(run, TAA_DEPTH, x, y), best = own, last = own, ignored, mine[2], front[2];
     int at = 4;
     for (int i = 0; i < 9; i++) {
-        double z = depth_at(run, TAA_DEPTH, x + i % 3 - 1, y + i / 3 - 1);
+        int nx = x + i % 3 - 1, ny = y + i / 3 - 1;
+        double z = depth_at(run, TAA_DEPTH, nx, ny);
         at = z < best ? i : at;
         best = fmin(best, z);
+        last = fmax(last, z);
+        if (run->images[TAA_STENCIL] && tap_id(run, TAA_STENCIL, nx, ny) != tap_id(run, TAA_STENCIL, x, y))
+            p.alone = false;
     }
+    p.edge = last > best * 1.02;
+    p.alone = p.alone && !p.edge;
+    p.behind = best < own * 0.98;
     int nx = x + at % 3 - 1, ny = y + at / 3 - 1;
-    follow(&run->frame, x, y, own, d, then);
-    if (run->images[TAA_MOTION]) {
-        d[0] = tap(run, TAA_MOTION, 0, nx, ny);
-        d[1] = tap(run, TAA_MOTION, 1, nx, ny);
-    } else {
-        follow(&run->frame, nx, ny, best, d, &ignored);
+    follow(&run->frame, x, y, own, mine, &p.then);
+    follow(&run->frame, nx, ny, best, front, &ignored);
+    for (int i = 0; i < 2 && run->images[TAA_MOTION]; i++) {
+        mine[i] = tap(run, TAA_MOTION, i, x, y);
+        front[i] = tap(run, TAA_MOTION, i, nx, ny);
     }
+    p.follows = p.behind && fmax(fabs(front[0] - mine[0]), fabs(front[1] - mine[1])) > 0.25;
     for (int i = 0; i < 2; i++)
-        if (fabs(d[i] - floor(d[i] + 0.5)) < 1.0 / 1024)
-            d[i] = floor(d[i] + 0.5);
+        p.d[i] = snap(p.behind ? front[i] : mine[i]);
+    p.still = p.d[0] == 0 && p.d[1] == 0;
+    return p;
 }
 
-/* Whether the 3x3 history pixels around (x, y) show the pixel's material at depths around z. */
-static bool shows(const shade_run *run, int x, int y, uint32_t id, double z)
+/* Whether history pixel (x, y) shows the surface of p or, where p is not alone, the 3x3 around it show its material at
+ * depths around p's. */
+static bool shows(const shade_run *run, int x, int y, uint32_t id, const place *p)
 {
-    double low = 2 * far_depth, high = 0;
+    double low = 2 * far_depth, high = 0, z = p->then;
     for (int i = 0; i < 9; i++) {
         int nx = x + i % 3 - 1, ny = y + i / 3 - 1;
+        double t = depth_at(run, TAA_LAST_DEPTH, nx, ny);
         if (run->images[TAA_STENCIL] && tap_id(run, TAA_LAST_STENCIL, nx, ny) != id)
             continue;
-        low = fmin(low, depth_at(run, TAA_LAST_DEPTH, nx, ny));
-        high = fmax(high, depth_at(run, TAA_LAST_DEPTH, nx, ny));
+        if (p->alone && i == 4)
+            return fabs(t - z) <= 0.04 * z;
+        low = fmin(low, t);
+        high = fmax(high, t);
     }
-    return z >= low * 0.98 && z <= high * 1.02;
+    return !p->alone && z >= low * 0.98 && z <= high * 1.02;
 }
 
-/* Catmull-Rom spline through samples at -1, 0, 1, 2. */
-static double kernel_weight(double t)
+/* Weights of the samples at -2 … 3 for a place t in 0…1 ("Spline36"). */
+static double kernel_weight(double d)
 {
-    t = fabs(t);
-    return t < 1 ? 1 + t * t * (1.5 * t - 2.5) : t < 2 ? 2 + t * (-4 + t * (2.5 - 0.5 * t)) : 0;
+    d = fabs(d);
+    if (d < 1)
+        return ((13.0 / 11 * d - 453.0 / 209) * d - 3.0 / 209) * d + 1;
+    if (d < 2)
+        return ((-6.0 / 11 * (d - 1) + 270.0 / 209) * (d - 1) - 156.0 / 209) * (d - 1);
+    return d < 3 ? ((1.0 / 11 * (d - 2) - 45.0 / 209) * (d - 2) + 26.0 / 209) * (d - 2) : 0;
 }
 
 static double resample(const shade_run *run, int plane, double x, double y)
@@ -149,8 +177,8 @@ static double resample(const shade_run *run, int plane, double x, double y)
     double sum = 0, least = 0;
     if (x == ix && y == iy)
         return tap(run, TAA_LAST_COLOR, plane, ix, iy);
-    for (int j = iy - 1; j <= iy + 2; j++) {
-        for (int i = ix - 1; i <= ix + 2; i++) {
+    for (int j = iy - 2; j <= iy + 3; j++) {
+        for (int i = ix - 2; i <= ix + 3; i++) {
             double v = tap(run, TAA_LAST_COLOR, plane, i, j);
             sum += v * kernel_weight(x - i) * kernel_weight(y - j);
             least = fmin(least, v);
@@ -163,27 +191,30 @@ void twin_taa(const shade_run *run, int x, int y, double *out)
 {
     const frame_t *f = &run->frame;
     const twin_taa_params *p = run->params;
-    double own[3], past[3], d[2], then;
+    double own[3], past[3];
     for (int c = 0; c < 3; c++)
         out[c] = own[c] = *shade_at(run->images[TAA_COLOR], f, c, x, y);
     out[3] = 1;
     if (!f->history || x < f->valid[0] || y < f->valid[1] || x >= f->valid[2] || y >= f->valid[3])
         return;
-    displacement(run, x, y, d, &then);
-    double px = x + d[0], py = y + d[1];
+    place at = find_place(run, x, y);
+    double px = x + at.d[0], py = y + at.d[1];
     if (px < f->valid[0] - 0.5 || py < f->valid[1] - 0.5 || px >= f->valid[2] - 0.5 ||
         py >= f->valid[3] - 0.5)
         return;
     int nx = (int)ceil(px - 0.5), ny = (int)ceil(py - 0.5); /* nearest, halves down */
     uint32_t id = run->images[TAA_STENCIL] ? shade_id(run->images[TAA_STENCIL], f, x, y) : 0;
-    if (!shows(run, nx, ny, id, then))
+    if (p->exclude[id / 32] >> id % 32 & 1)
         return;
+    double n = tap(run, TAA_LAST_COUNT, 0, nx, ny);
+    if (!shows(run, nx, ny, id, &at) || (n < 0 && (at.alone || (at.behind && !at.follows))))
+        return;
+    n = at.edge && !at.still ? fmin(fabs(n), 4) : fabs(n);
     for (int c = 0; c < 3; c++)
         past[c] = resample(run, c, px, py);
-    double n = tap(run, TAA_LAST_COUNT, 0, nx, ny), alpha = fmax(1 / (1 + n), p->blend);
-    double brightest = clip(run, x, y, d[0] == 0 && d[1] == 0, past);
+    double alpha = fmax(1 / (1 + n), p->blend), brightest = clip(run, x, y, at.still, past);
     double w = alpha * weight(own, brightest), w_past = (1 - alpha) * weight(past, brightest);
     for (int c = 0; c < 3; c++)
         out[c] = (own[c] * w + past[c] * w_past) / (w + w_past);
-    out[3] = fmin(n + 1, 65536);
+    out[3] = fmin(n + 1, 65536) * (at.follows ? -1 : 1);
 }

@@ -21,6 +21,7 @@ enum {
 
 typedef struct twin_taa_params {
     float blend, clip_gamma;
+    uint32_t exclude[8];
 } twin_taa_params;
 
 /* out: R G B count. run->params is a twin_taa_params. */

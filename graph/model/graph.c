@@ -249,11 +249,12 @@ static rl_code convert_image(rl_graph_builder *b, size_t first_added, const rl_w
     if (!name)
         return rl_fail_memory(b->err, strlen(wanted->name) + 16);
     if (b->images[*image].format != pass->ports.rows[read].format)
-        return rl_fail(b->err, RL_E_CONFIG, l->where,
-                       "output '%s': only %s images are colour-converted, '%s' is %s; leave out colorspace, display, "
-                       "view, look and exposure",
-                       wanted->name, rl_format_name(pass->ports.rows[read].format), b->images[*image].name,
-                       rl_format_name(b->images[*image].format));
+        return rl_fail(
+            b->err, RL_E_CONFIG, l->where,
+            "output '%s': only %s images are colour-converted, '%s' is %s; leave out colorspace, display, "
+            "view, look and exposure",
+            wanted->name, rl_format_name(pass->ports.rows[read].format), b->images[*image].name,
+            rl_format_name(b->images[*image].format));
     rl_code code = add_node(b, &(rl_node){.name = name, .pass = pass, .params = params});
     if (code != RL_OK)
         return code;
@@ -281,7 +282,8 @@ static rl_code add_output(rl_graph_builder *b, size_t first_added, const rl_want
     rl_code code = RL_OK;
     for (size_t i = 0; i < wanted->n_layers && code == RL_OK; i++) {
         code = rl_graph_resolve(b, wanted->layers[i].image, wanted->layers[i].where, user, &images[i]);
-        if (code == RL_OK && wanted->convert && wanted->convert[i] && !is_data_beside(b, wanted, i, images[i]))
+        if (code == RL_OK && wanted->convert && wanted->convert[i] &&
+            !is_data_beside(b, wanted, i, images[i]))
             code = convert_image(b, first_added, wanted, i, &images[i]);
     }
     return code;

@@ -83,6 +83,14 @@ static rl_code read_stencil(rl_id_list *list, unsigned dense, const rl_value *v,
     return code;
 }
 
+static bool looks_like_one(const rl_id_list *list, const char *name)
+{
+    for (size_t i = 0; i < list->n_names; i++)
+        if (rl_nearest(name, &list->names[i].name, 1))
+            return true;
+    return false;
+}
+
 rl_code rl_ids_read(rl_id_list *list, rl_materials *m, unsigned dense, const rl_entry *entry, rl_error *err)
 {
     const rl_value *stencil = rl_value_get(entry->value, "stencil");
@@ -100,6 +108,11 @@ rl_code rl_ids_read(rl_id_list *list, rl_materials *m, unsigned dense, const rl_
     rl_code code = add_named(list, entry->key, dense, entry->where, &found, err);
     if (code || found)
         return code;
+    if (list->n_names && !looks_like_one(list, entry->key)) {
+        rl_report(list->log, RL_WARNING, entry->where, "material '%s' is not in this capture: none of its %zu named ids is "
+                  "called so", entry->key, list->n_names);
+        return RL_OK;
+    }
     char *text = rl_arena_printf(list->arena, "material '%s' needs 'stencil' (an id): the capture %s",
                                  entry->key, list->n_names ? "names no id like it" : "has no stencil_names");
     return unknown_name(list, entry->where, text, entry->key, err);

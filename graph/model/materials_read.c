@@ -213,6 +213,8 @@ static bool takes(const rl_param *row, rl_kind kind)
         return kind == RL_TEXT;
     case RL_ROWS:
         return kind == RL_LIST;
+    case RL_MATERIALS:
+        return false;
     }
     return false;
 }
@@ -280,7 +282,7 @@ rl_code rl_materials_resolve_from(const rl_registry *registry, rl_arena *arena, 
         .n_used = n_used,
         .log = log,
         .m = m,
-        .ids = {.arena = arena, .names = names, .n_names = n_names},
+        .ids = {.arena = arena, .log = log, .names = names, .n_names = n_names},
         .err = err
     };
     rl_code code = rl_material_rows(arena, registry, &m->rows, &m->n_rows, &m->entry_bytes, err);

@@ -118,8 +118,8 @@ size_t rl_param_bytes(const rl_param *row)
 
 void rl_param_default(const rl_param *row, void *out)
 {
-    if (row->type == RL_ROWS) {
-        memset(out, 0, rl_list_bytes(row));
+    if (row->type == RL_ROWS || row->type == RL_MATERIALS) {
+        memset(out, 0, rl_param_bytes(row));
     } else if (row->type == RL_RGBF) {
         for (size_t i = 0; i < 3; i++)
             store_float(out, i, row->no_default ? -1 : row->def[i]);
@@ -169,6 +169,14 @@ static rl_code read_rgb(const rl_param *row, const rl_value *v, void *out, rl_er
     return RL_OK;
 }
 
+static rl_code check_material(const rl_param *row, const rl_value *v, rl_error *err)
+{
+    bool id = v->kind == RL_NUMBER && v->integral && v->integer >= INT32_MIN && v->integer <= UINT32_MAX;
+    return id || v->kind == RL_TEXT
+               ? RL_OK
+               : rl_value_wrong(v, row->name, "materials: names, stencil names or ids, or a list of them", err);
+}
+
 rl_code rl_param_read(const rl_param *row, const rl_value *v, void *out, rl_error *err)
 {
     rl_code code = RL_OK;
@@ -198,6 +206,13 @@ rl_code rl_param_read(const rl_param *row, const rl_value *v, void *out, rl_erro
         break;
     case RL_ROWS:
         code = rl_list_read(row, v, out, err);
+        break;
+    case RL_MATERIALS:
+        memset(out, 0, rl_param_bytes(row)); /* rl_material_sets_fill, when the capture is known */
+        for (size_t i = 0; i < v->n && v->kind == RL_LIST && !code; i++)
+            code = check_material(row, v->items[i], err);
+        if (v->kind != RL_LIST)
+            code = check_material(row, v, err);
         break;
     }
     return code;
@@ -282,6 +297,22 @@ static float load_float(const void *value, size_t i)
     return v;
 }
 
+/* By dense index: names belong to a capture's materials. */
+static void print_materials(const void *value, rl_str *s)
+{
+    uint32_t words[RL_SET_WORDS];
+    const char *comma = "";
+    memcpy(words, value, sizeof words);
+    rl_str_add(s, "[");
+    for (unsigned i = 0; i < 32 * RL_SET_WORDS; i++) {
+        if (words[i / 32] >> i % 32 & 1) {
+            rl_str_printf(s, "%s%u", comma, i);
+            comma = ", ";
+        }
+    }
+    rl_str_add(s, "]");
+}
+
 void rl_param_print(const rl_param *row, const void *value, rl_str *s)
 {
     char text[3][32];
@@ -309,21 +340,26 @@ void rl_param_print(const rl_param *row, const void *value, rl_str *s)
     case RL_ROWS:
         rl_list_print(row, value, s);
         break;
+    case RL_MATERIALS:
+        print_materials(value, s);
+        break;
     }
 }
 
 void rl_param_describe(const rl_param *row, rl_str *s)
 {
-    float value[3];
+    float value[RL_SET_WORDS];
     const char *unit = row->unit && row->unit[0] ? row->unit : NULL;
     size_t before = s->length;
     if (row->type == RL_ROWS)
         rl_list_expected(row, s);
+    else if (row->type == RL_MATERIALS)
+        rl_str_add(s, "a list of materials, stencil names or ids");
     else if (row->type == RL_BOOL)
         rl_str_add(s, "true|false");
     else if (row->words)
         rl_str_add(s, row->words);
-    if (row->type != RL_BOOL && row->type != RL_ENUM && row->type != RL_ROWS) {
+    if (row->type != RL_BOOL && row->type != RL_ENUM && row->type != RL_ROWS && row->type != RL_MATERIALS) {
         if (s->length > before)
             rl_str_add(s, "|");
         size_t words = s->length;
@@ -353,7 +389,9 @@ void rl_param_field(const rl_param *row, const char *prefix, rl_str *s)
         return;
     }
     rl_str_printf(s, "%s %s%s%s;", real ? "float" : "int", prefix, row->name,
-                  row->type == RL_RGBF ? "[3]" : "");
+                  row->type == RL_RGBF        ? "[3]"
+                  : row->type == RL_MATERIALS ? "[8]"
+                                              : "");
 }
 
 void rl_params_struct_text(rl_params params, const char *name, rl_str *s)

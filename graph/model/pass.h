@@ -9,6 +9,7 @@
  *     constant frame_t *       size, number, cameras            (kernels/shared.h)
  *     constant material_t *    one entry a dense stencil index  (generated: every registered pass's rows)
  *     constant light_t *       when .lights is set
+ *     constant ambient_t *     when .ambient is set
  *     constant float *         when .tables is set: what the host computed
  */
 #ifndef RL_MODEL_PASS_H
@@ -36,6 +37,8 @@ typedef enum rl_type {
     RL_RGBF, /* float[3]; one number in YAML means three equal ones */
     RL_ROWS, /* a list of min … max maps of further rows (.list): int32_t NAME_n, then for each of those rows an
                 array NAME_ROW[max], RGB rows [3 * max]; elements beyond NAME_n are 0 */
+    RL_MATERIALS, /* a set of materials, by name, stencil name or id: uint32_t[8], bit id & 31 of word id >> 5 for dense
+                     index id. Parameters of a pass only; filled per capture, since stencil names are the capture's */
 } rl_type;
 
 struct rl_param;
@@ -61,6 +64,9 @@ typedef struct rl_param {
                             declares it so; rows of a list: every element must */
     bool no_default;     /* rows of the material table with min >= 0: the device sees -1 where it is not given */
     const char *required_with; /* profile rows, "KEY=a|b": required of profiles whose KEY is one of the words */
+    const char *needed_by; /* profile rows with no_default, "diffuse: sg": required of the profiles of materials with that
+                              shading word (graph.h), */
+    const char *instead;   /* unless the profile gives this other row; or NULL */
     rl_params list;      /* RL_ROWS: the keys of an element, none of them RL_ROWS */
     double most_sum;     /* float rows of a list, > 0: what the elements add up to at most, each channel (+1e-6) */
 } rl_param;
@@ -77,6 +83,9 @@ typedef struct rl_param {
 #define P_ENUM(struct_, field, words_, def_, ...)                                                     \
     {.name = #field, .type = RL_ENUM, .offset = offsetof(struct_, field), .min = 0, .max = 1e9,              \
      .def = {(def_), (def_), (def_)}, .words = (words_), .unit = "", .help = __VA_ARGS__}
+/* A set of materials, empty by default. */
+#define P_MATERIALS(struct_, field, ...)                                                              \
+    {.name = #field, .type = RL_MATERIALS, .offset = offsetof(struct_, field), .unit = "", .help = __VA_ARGS__}
 /* Rows of the material table (profile, material, shading keys): no struct on the host. */
 #define M(type_, field, min_, max_, def_, unit_, ...)                                                 \
     {.name = #field, .type = (type_), .min = (min_), .max = (max_), .def = {(def_), (def_), (def_)},         \
@@ -90,7 +99,8 @@ typedef struct rl_param {
      .help = __VA_ARGS__}
 
 /* Of all types but RL_ROWS: rl_param_bytes in params.h has those too. */
-#define RL_PARAM_BYTES(type) ((type) == RL_RGBF ? 12u : 4u)
+#define RL_PARAM_BYTES(type) ((type) == RL_RGBF ? 12u : (type) == RL_MATERIALS ? 4u * RL_SET_WORDS : 4u)
+#define RL_SET_WORDS 8u /* of RL_MATERIALS: room for 256 materials, the empty one included */
 
 /* ---- ports --------------------------------------------------------------------------------------------- */
 
@@ -121,6 +131,9 @@ typedef struct rl_port {
     rl_format format;
     const char *help;
     bool optional;     /* READ: may be absent; the kernel sees NULL and HAS_NAME 0 */
+    const char *if_absent; /* optional READ: what the pass does without it, said once in the log; NULL = not worth a word */
+    const char *needed_by; /* optional READ: "diffuse: sg" is a shading key of this pass and a word of it; a material with a
+                              profile and that word makes the port required (graph.h); NULL = none does */
     const char *of;    /* HISTORY: the port (own output first, else own input) whose past this is */
     rl_layout layout;  /* the layout that the kernel wants; the plan inserts the conversion */
     bool any_layout;   /* WRITE: the kernel stores through RL_STORE, so the plan may choose (LAYOUT_NAME) */
@@ -160,7 +173,7 @@ typedef struct rl_pass {
     const char *help;        /* one line */
     const char *source;      /* paper, talk, equation */
     const char *kernel;      /* file in kernels/, or NULL when kernel_text is set */
-    const char *kernel_prelude; /* another file in kernels/, put in front of it; NULL = none */
+    const char *kernel_prelude; /* other files in kernels/, put in front of it: "a.cl b.cl"; NULL = none */
     const char *kernel_text; /* the program itself, for passes built at run time; named kernel_file in errors */
     const char *kernel_file;
     rl_params params;
@@ -175,6 +188,7 @@ typedef struct rl_pass {
         size_t n;
     } steps;
     bool lights; /* the kernel gets the lights, and the run the shadow layers that they use */
+    bool ambient; /* the kernel gets the ambient light */
     /* Computes constant tables from parameters and materials, in double, into `arena`; NULL = none. Pure. */
     rl_code (*tables)(const rl_pass_input *in, rl_arena *arena, rl_tables *out, rl_error *err);
     const void *data; /* for .tables of a pass that is built at run time; the engine does not look at it */

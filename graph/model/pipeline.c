@@ -140,6 +140,7 @@ static rl_code read_node(parser *q, const rl_entry *entry, rl_node *node)
     if (code)
         return code;
     bool user = !!node->pass->kernel_text;
+    node->map = entry->value;
     return rl_params_read(q->arena, node->pass, node->name, entry->value, user ? rl_user_kernel_keys : keys,
                           user ? rl_user_kernel_n_keys : RL_ARRAY_LENGTH(keys), &node->params, q->err);
 }
@@ -235,7 +236,7 @@ static rl_code make_hash(parser *q)
 static rl_code read_sections(parser *q)
 {
     static const char *const keys[] = {"relit",     "capture", "color", "profiles", "shading",
-                                       "materials", "lights",  "graph", "outputs"};
+                                       "materials", "lights",  "ambient", "graph", "outputs"};
     const rl_value *root = q->p->root, *include = rl_value_get(root, "include"), *outputs = NULL;
     if (root->kind != RL_MAP)
         return rl_value_wrong(root, "pipeline", "a map that starts with 'relit: 1'", q->err);
@@ -256,6 +257,8 @@ static rl_code read_sections(parser *q)
         code = read_map(q, "materials", &q->p->materials);
     if (!code)
         code = read_map(q, "lights", &q->p->lights);
+    if (!code)
+        code = read_map(q, "ambient", &q->p->ambient);
     if (!code)
         code = read_graph(q, rl_value_get(root, "graph"));
     if (!code)

@@ -22,9 +22,10 @@ typedef struct rl_node {
     const char *name;
     rl_where where; /* of the name; RL_NOWHERE for nodes that relit adds */
     const rl_pass *pass;
-    const void *params; /* pass->params_size bytes */
+    const void *params; /* pass->params_size bytes; sets of materials are empty, see rl_material_sets_fill */
     const rl_node_input *inputs;
     size_t n_inputs;
+    const rl_value *map; /* as written; NULL for nodes that relit adds */
 } rl_node;
 
 typedef struct rl_output_layer {
@@ -66,6 +67,7 @@ typedef struct rl_pipeline {
     rl_where color_where;
     const rl_value *profiles, *shading, *materials; /* maps or NULL, see materials.h */
     const rl_value *lights;                         /* map, or NULL: the capture's own */
+    const rl_value *ambient;                        /* map (ambient.h), or NULL */
     const rl_node *nodes;                           /* in the order of the file */
     size_t n_nodes;
     const rl_output *outputs;

@@ -11,6 +11,7 @@
     X(sss_reference)                                                                                         \
     X(combine)                                                                                               \
     X(geometric_normal)                                                                                      \
+    X(curvature)                                                                                             \
     X(taa)
 
 #define RL_DECLARE(name) extern const rl_pass rl_pass_##name;

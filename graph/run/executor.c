@@ -159,6 +159,7 @@ void rl_executor_free(rl_executor **executor)
     rl_memory_free(&x->materials);
     rl_memory_free(&x->frame);
     rl_memory_free(&x->lights);
+    rl_memory_free(&x->ambient);
     rl_arena_free(&x->arena);
     rl_free(x);
 }
@@ -284,7 +285,7 @@ static rl_code run_kernel(rl_executor *x, const rl_plan_step *s, const rl_frame_
     const rl_step *step = &pass->steps.rows[s->step];
     rl_memory *args[MOST_ARGUMENTS];
     size_t k = 0;
-    if (pass->ports.n + 5 > MOST_ARGUMENTS)
+    if (pass->ports.n + 6 > MOST_ARGUMENTS)
         return rl_fail(err, RL_E_CONFIG, g->where, "pass '%s' (%s) has too many ports (%zu)", g->name,
                        pass->name, pass->ports.n);
     for (size_t i = 0; i < pass->ports.n; i++)
@@ -295,6 +296,8 @@ static rl_code run_kernel(rl_executor *x, const rl_plan_step *s, const rl_frame_
     args[k++] = x->materials;
     if (pass->lights)
         args[k++] = x->lights;
+    if (pass->ambient)
+        args[k++] = x->ambient;
     if (pass->tables)
         args[k++] = n->tables;
     rl_dispatch d;
@@ -355,6 +358,9 @@ static rl_code upload_frame(rl_executor *x, const rl_frame_values *v, rl_error *
     rl_code code = upload(x, &f, sizeof f, &x->frame, err);
     if (!code)
         code = upload(x, v->lights, (size_t)v->n_lights * sizeof *v->lights, &x->lights, err);
+    const ambient_t none = {0};
+    if (!code)
+        code = upload(x, v->ambient ? v->ambient : &none, sizeof none, &x->ambient, err);
     return code;
 }
 

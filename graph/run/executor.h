@@ -43,6 +43,7 @@ typedef struct rl_frame_values {
     camera_t camera;
     const light_t *lights;
     int n_lights; /* at most what it was for the first frame, or any number for it */
+    const ambient_t *ambient; /* NULL = none */
 } rl_frame_values;
 
 /* Runs all steps and waits for them; then history swaps. On an error history is empty afterwards. `spans` may

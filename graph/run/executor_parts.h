@@ -18,7 +18,7 @@ struct rl_executor {
     const rl_log *log;
     rl_node_state *nodes; /* [graph->n_nodes] */
     rl_program *convert;
-    rl_memory *materials, *frame, *lights;
+    rl_memory *materials, *frame, *lights, *ambient;
     rl_geometry geometry; /* columns 0: no size yet */
     rl_memory **slots;    /* [plan->n_slots] */
     rl_memory **history;  /* [plan->n_buffers][2]; NULL where the buffer is not HISTORY */

@@ -56,6 +56,19 @@ static rl_code add_file(rl_arena *arena, const char *name, rl_str *out, rl_error
     return RL_OK;
 }
 
+/* Names separated by spaces. */
+static rl_code add_files(rl_arena *arena, const char *names, rl_str *out, rl_error *err)
+{
+    rl_code code = RL_OK;
+    while (names && *names && !code) {
+        size_t n = strcspn(names, " ");
+        const char *name = rl_arena_strndup(arena, names, n);
+        code = name ? add_file(arena, name, out, err) : rl_fail_memory(err, n);
+        names += n + strspn(names + n, " ");
+    }
+    return code;
+}
+
 static rl_code add_shared(rl_arena *arena, rl_str *out, rl_error *err)
 {
     rl_code code = add_file(arena, "shared.h", out, err);
@@ -104,8 +117,7 @@ rl_code rl_kernel_text(rl_arena *arena, const rl_plan *plan, const rl_plan_node 
     rl_code code = add_shared(arena, out, err);
     if (code)
         return code;
-    if (pass->kernel_prelude)
-        code = add_file(arena, pass->kernel_prelude, out, err);
+    code = add_files(arena, pass->kernel_prelude, out, err);
     if (code)
         return code;
     if (pass->kernel_text) {

@@ -57,6 +57,8 @@ rl_code rl_session_open(const rl_options *options, rl_session **out, rl_error *e
     if (!code)
         code = rl_session_colors(s, err);
     if (!code)
+        code = rl_session_ambient(s, err);
+    if (!code)
         code = rl_session_sequences(s, err);
     if (!code)
         code = rl_session_paths(s, err);
@@ -111,7 +113,7 @@ size_t rl_session_frames(const rl_session *s, size_t capture)
 
 long long rl_session_frame(const rl_session *s, size_t capture, size_t i)
 {
-    return s->sequences[capture].frames.numbers[i];
+    return i < rl_session_frames(s, capture) ? s->sequences[capture].frames.numbers[i] : 0;
 }
 
 rl_code rl_session_plan(const rl_session *s, size_t capture, rl_plan_format format, char **text, rl_error *err)

@@ -35,6 +35,7 @@ typedef struct rl_sequence {
     light_t *light_values; /* of the frame that runs */
     rl_light_planes shadow, thickness;
     const rl_materials *materials;
+    const rl_node *nodes; /* the pipeline's, with this capture's sets of materials */
     const rl_graph *graph;
     const rl_plan *plan;
     rl_geometry geometry; /* of the first frame */
@@ -51,6 +52,7 @@ struct rl_session {
     const rl_pipeline *pipeline;
     rl_ocio *ocio;
     const char *working;
+    ambient_t ambient; /* in the working space */
     rl_pool *pool;
     rl_device *device;
     rl_sink_output *outputs; /* the pipeline's that are wanted, then one for each dump */
@@ -73,6 +75,9 @@ rl_code rl_session_light_matrix(const rl_session *session, const char *space, rl
 /* session_lights.c: the active lights of a capture; what the kernels see of them at a frame. */
 rl_code rl_session_lights(rl_session *session, rl_sequence *sequence, rl_error *err);
 void rl_session_light_values(const rl_sequence *sequence, const camera_t *camera, light_t *out);
+
+/* session_ambient.c: the pipeline's ambient light; reads its HDRI. */
+rl_code rl_session_ambient(rl_session *session, rl_error *err);
 
 /* session_capture.c: manifests, frames, materials, graph and plan of every capture. */
 rl_code rl_session_sequences(rl_session *session, rl_error *err);

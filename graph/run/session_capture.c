@@ -1,9 +1,11 @@
 /* The captures of a session: manifest, frames, lights, materials, graph, plan. */
 #include <stdio.h>
 #include <string.h>
+#include <strings.h>
 
 #include "graph/base/alloc.h"
 #include "graph/base/file.h"
+#include "graph/model/materials_sets.h"
 #include "graph/model/registry.h"
 #include "graph/run/data_files.h"
 #include "graph/run/session.h"
@@ -139,8 +141,11 @@ static rl_code make_materials(rl_session *s, rl_sequence *q, rl_error *err)
         names[i] = (rl_stencil_name){.id = m->stencil_names[i].id, .name = m->stencil_names[i].name};
     for (size_t i = 0; i < p->n_nodes; i++)
         used[i] = p->nodes[i].pass;
-    return rl_materials_resolve(&s->arena, p->profiles, p->shading, p->materials, names, m->n_stencil_names, used,
-                                p->n_nodes, s->log, &q->materials, err);
+    rl_code code = rl_materials_resolve(&s->arena, p->profiles, p->shading, p->materials, names, m->n_stencil_names,
+                                        used, p->n_nodes, s->log, &q->materials, err);
+    return code ? code
+                : rl_material_sets_fill(&s->arena, p->nodes, p->n_nodes, q->materials, names, m->n_stencil_names,
+                                        &q->nodes, err);
 }
 
 /* The layers that the graph can bind: single ones, each light's, and the planes of the active lights together. */
@@ -165,15 +170,53 @@ static rl_code list_layers(rl_session *s, const rl_sequence *q, rl_layer_info **
     return RL_OK;
 }
 
+/* Says, once a capture, what passes do without an input that they would like to have. */
+static void note_absent(const rl_session *s, const rl_sequence *q)
+{
+    for (size_t i = 0; i < q->plan->n_nodes; i++) {
+        const rl_graph_node *node = &q->graph->nodes[q->plan->nodes[i].node];
+        for (size_t p = 0; p < node->pass->ports.n; p++) {
+            const rl_port *port = &node->pass->ports.rows[p];
+            if (port->if_absent && node->images[p] < 0)
+                rl_report(s->log, RL_NOTE, node->where, "pass '%s' (%s): capture '%s' has no layer '%s': %s", node->name,
+                          node->pass->name, q->manifest->name, port->name, port->if_absent);
+        }
+    }
+}
+
+/* Image files other than EXR hold grey or colours. */
+static rl_code check_formats(const rl_session *s, const rl_graph *graph, rl_error *err)
+{
+    for (size_t i = 0; i < s->n_outputs; i++) {
+        const rl_output *o = s->outputs[i].spec;
+        const rl_image *image = &graph->images[graph->outputs[i].images[0]];
+        bool many = image->planes > 3 || image->planes == 2;
+        if (strcasecmp(rl_path_extension(o->file), ".exr") && (image->format == RL_ID || many))
+            return rl_fail(err, RL_E_CONFIG, o->file_where,
+                           "output '%s': a %s file cannot hold '%s' (%s, %d plane%s); write .exr", o->name,
+                           rl_path_extension(o->file), image->name, rl_format_name(image->format), image->planes,
+                           image->planes == 1 ? "" : "s");
+    }
+    return RL_OK;
+}
+
 static rl_code make_plan(rl_session *s, rl_sequence *q, rl_error *err)
 {
     rl_layer_info *layers = NULL;
     size_t n = 0;
     rl_code code = list_layers(s, q, &layers, &n, err);
     if (!code)
-        code = rl_graph_build(&s->arena, s->pipeline->nodes, s->pipeline->n_nodes, layers, n, s->wanted,
+        code = rl_graph_build(&s->arena, q->nodes, s->pipeline->n_nodes, layers, n, s->wanted,
                               s->n_outputs + 1, &q->graph, err);
-    return code ? code : rl_plan_make(&s->arena, q->graph, &q->plan, err);
+    if (!code)
+        code = check_formats(s, q->graph, err);
+    if (!code)
+        code = rl_graph_check_needs(&s->arena, q->graph, q->materials, err);
+    if (!code)
+        code = rl_plan_make(&s->arena, q->graph, &q->plan, err);
+    if (!code)
+        note_absent(s, q);
+    return code;
 }
 
 static bool wants_ids(const rl_session *s)

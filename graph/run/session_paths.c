@@ -128,7 +128,7 @@ static rl_code compare(const lister *l, rl_error *err)
 {
     const written *found = NULL;
     rl_arena arena = {0};
-    const char *path = NULL, *first = NULL;
+    const char *path = NULL;
     rl_code code = RL_OK;
     for (size_t i = 1; i < l->n && !code; i++) {
         const written *w = &l->list[i - 1];
@@ -137,13 +137,14 @@ static rl_code compare(const lister *l, rl_error *err)
         if (w[0].hash != w[1].hash || w[0].output >= INPUT || !earlier)
             continue;
         code = same_file(l, &arena, w, &path, &same, err);
-        if (same) {
-            found = w;
-            first = path;
-        }
+        found = same ? w : found;
     }
+    const lister plain = {.s = l->s,
+                          .out = l->s->options.out ? l->s->options.out : "out"}; /* as the user wrote it */
     if (!code && found)
-        code = collide(l->s, &found[0], &found[1], first, err);
+        code = spell(&plain, &arena, found, &path, err);
+    if (!code && found)
+        code = collide(l->s, &found[0], &found[1], path, err);
     rl_arena_free(&arena);
     return code;
 }

@@ -1,4 +1,5 @@
 /* A frame through a session: its kernels, its files, and one at a time. */
+#include <limits.h>
 #include <string.h>
 
 #include "graph/base/alloc.h"
@@ -16,7 +17,6 @@ rl_code rl_session_fit_buffers(rl_sequence *q, rl_frame *f, rl_error *err)
 rl_code rl_session_execute(rl_session *s, rl_sequence *q, rl_frame *f, bool cut, rl_span *spans,
                            rl_error *err)
 {
-    (void)s;
     rl_code code = rl_executor_resize(q->executor, &f->geometry, err);
     if (code)
         return code;
@@ -24,7 +24,11 @@ rl_code rl_session_execute(rl_session *s, rl_sequence *q, rl_frame *f, bool cut,
         rl_executor_cut(q->executor);
     rl_session_light_values(q, &f->camera, q->light_values);
     rl_frame_values values = {
-        .number = f->number, .camera = f->camera, .lights = q->light_values, .n_lights = (int)q->n_lights};
+        .number = f->number,
+        .camera = f->camera,
+        .lights = q->light_values,
+        .n_lights = (int)q->n_lights,
+        .ambient = &s->ambient};
     return rl_executor_run(q->executor, f->buffers, &values, spans, err);
 }
 
@@ -146,6 +150,8 @@ rl_code rl_session_process(rl_session *s, size_t capture, long long number, cons
     s->processed = false;
     if (capture >= s->n_sequences)
         return rl_fail(err, RL_E_USAGE, RL_NOWHERE, "there is no capture %zu", capture);
+    if (number < INT_MIN || number > INT_MAX)
+        return rl_fail(err, RL_E_USAGE, RL_NOWHERE, "frame %lld is not within %d … %d", number, INT_MIN, INT_MAX);
     rl_sequence *q = &s->sequences[capture];
     rl_code code = rl_session_prepare(s, err);
     if (code)

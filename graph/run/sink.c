@@ -3,6 +3,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
+#include <strings.h>
 
 #include "graph/base/alloc.h"
 #include "graph/base/arena.h"
@@ -237,7 +238,7 @@ rl_code rl_sink_write(const char *path, const rl_sink_output *output, const rl_s
         code = rl_folder_make(folder, err);
     if (!code)
         code = make_coverage(frame, &r, pool, &coverage, err);
-    if (!code && !strcmp(rl_path_extension(path), ".exr"))
+    if (!code && !strcasecmp(rl_path_extension(path), ".exr"))
         code = write_exr(path, output, images, n_images, frame, &r, coverage, pool, clamped, err);
     else if (!code)
         code = rl_sink_write_image(path, output, &images[0], (size_t)r.y0 * images[0].stride + (size_t)r.x0, r.width,

@@ -67,8 +67,8 @@ static size_t check_headers(const rl_tool *tool, rl_session *session)
                             (how == RL_MISSING_SKIP || (how == RL_MISSING_HOLD && any_good));
                 if (skip)
                     rl_report(&tool->report->log, RL_WARNING, (rl_where){.file = err.file},
-                              "frame %d would be %s: %s", frame.number, how == RL_MISSING_SKIP ? "skipped" : "held",
-                              err.text);
+                              "frame %d would be %s: %s", frame.number,
+                              how == RL_MISSING_SKIP ? "skipped" : "held", err.text);
                 else
                     rl_report_error(tool->report, &err);
                 bad += !skip;

@@ -8,7 +8,7 @@
 #include "graph/tool/tool.h"
 
 static const char *const role_names[] = {"in", "out", "history", "scratch"};
-static const char *const type_names[] = {"number", "integer", "true|false", "word", "rgb", "list"};
+static const char *const type_names[] = {"number", "integer", "true|false", "word", "rgb", "list", "materials"};
 
 /* `pass: kernel` has no table: its ports and parameters are the user's. A test runs the example. */
 static const char kernel_name[] = "kernel";

@@ -1,0 +1,72 @@
+/* The ambient light of a session: written coefficients, lobes and an HDRI, in the working space. */
+#include <string.h>
+
+#include "graph/model/ambient.h"
+#include "graph/run/image_file.h"
+#include "graph/run/session.h"
+
+static rl_code add_hdri(const rl_session *s, rl_ambient *a, rl_error *err)
+{
+    rl_image_file file = {0};
+    rl_code code = rl_image_file_read(a->hdri, &file, err);
+    if (code)
+        return code;
+    size_t plane = (size_t)file.width * (size_t)file.height;
+    const float *rgb[3];
+    for (size_t c = 0; c < 3; c++)
+        rgb[c] = file.planes + (file.channels >= 3 ? c * plane : 0);
+    if (file.type != RL_IMAGE_HALF && file.type != RL_IMAGE_FLOAT)
+        code = rl_fail(err, RL_E_CONFIG, a->hdri_where,
+                       "%s holds integers; an hdri is linear light, half or float", a->hdri);
+    if (!code && file.width != 2 * file.height)
+        rl_report(s->log, RL_WARNING, a->hdri_where,
+                  "%s has %d x %d pixels; a latitude-longitude image is twice as wide as high", a->hdri,
+                  file.width, file.height);
+    unsigned long long bad = code ? 0 : rl_ambient_project(a, rgb, file.width, file.height, a->sh);
+    if (bad)
+        rl_report(s->log, RL_WARNING, a->hdri_where, "%s: %llu samples are NaN or infinite and count as 0",
+                  a->hdri, bad);
+    rl_image_file_free(&file);
+    return code;
+}
+
+/* Row c of the matrix, times intensity. */
+static float convert(const rl_ambient *a, const float m[9], const double rgb[3], int c)
+{
+    double sum = 0;
+    for (int k = 0; k < 3; k++)
+        sum += (double)m[3 * c + k] * a->intensity[k] * rgb[k];
+    return (float)sum;
+}
+
+rl_code rl_session_ambient(rl_session *s, rl_error *err)
+{
+    rl_ambient a;
+    float m[9];
+    if (!s->pipeline->ambient)
+        return RL_OK;
+    rl_code code = rl_ambient_parse(&s->arena, s->pipeline->ambient, &a, err);
+    if (!code)
+        code = rl_session_light_matrix(s, a.colorspace, a.colorspace_where, m, err);
+    if (!code && a.hdri)
+        code = add_hdri(s, &a, err);
+    if (code)
+        return code;
+    ambient_t *out = &s->ambient;
+    out->on = 1;
+    out->lobes = (int)a.n_lobes;
+    for (int c = 0; c < 3; c++) {
+        for (int i = 0; i < RL_AMBIENT_BANDS; i++)
+            out->sh[3 * i + c] = convert(&a, m, a.sh[i], c);
+        for (size_t i = 0; i < a.n_lobes; i++) {
+            const rl_ambient_lobe *lobe = &a.lobes[i];
+            out->lobe[i].axis[c] = (float)lobe->axis[c];
+            out->lobe[i].sharpness = (float)lobe->sharpness;
+            out->lobe[i].flux[c] =
+                convert(&a, m, lobe->amplitude, c) * (float)rl_ambient_lobe_flux(lobe->sharpness);
+        }
+    }
+    return RL_OK;
+}
+
+_Static_assert((int)RL_AMBIENT_LOBES == RL_LOBES, "the pipeline's limit is the kernels'");
