@@ -42,6 +42,9 @@ typedef struct rl_sequence {
     uint64_t decode_bytes; /* that reading it takes besides its buffers */
     rl_reader *reader;
     rl_executor *executor; /* NULL until prepared */
+    bool has_last;         /* the frame that ran last, and may be the past of the next one */
+    int last_number;
+    camera_t last_camera;
 } rl_sequence;
 
 struct rl_session {
@@ -87,9 +90,9 @@ void rl_sequence_close(rl_sequence *sequence);
 /* session_paths.c: no two outputs, captures or frames write one file. */
 rl_code rl_session_paths(rl_session *session, rl_error *err);
 
-/* session_run.c (batches of frames: session_batch.c): runs the kernels on a loaded frame. `cut`: history does not reach here. `spans`: NULL, or plan->n_steps
- * of them. */
-rl_code rl_session_execute(rl_session *session, rl_sequence *sequence, rl_frame *frame, bool cut, rl_span *spans,
+/* session_run.c (batches of frames: session_batch.c): runs the kernels on a loaded frame, and decides whether history reaches
+ * it. `spans`: NULL, or plan->n_steps of them. */
+rl_code rl_session_execute(rl_session *session, rl_sequence *sequence, rl_frame *frame, rl_span *spans,
                            rl_error *err);
 /* Buffers follow the size of the frame that they hold. */
 rl_code rl_session_fit_buffers(rl_sequence *sequence, rl_frame *frame, rl_error *err);
