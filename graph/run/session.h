@@ -63,6 +63,7 @@ struct rl_session {
     size_t n_outputs;
     rl_sequence *sequences;
     size_t n_sequences;
+    size_t *ends; /* [n_sequences] how many frames captures 0…k have together */
     /* rl_session_process: its one frame */
     rl_frame frame;
     rl_sequence *frame_sequence; /* NULL: none yet */
@@ -102,6 +103,9 @@ rl_code rl_session_write_frame(rl_session *session, rl_sequence *sequence, rl_fr
 /* Where the planes of a graph output's image are, mapped; unmap with the memory. */
 rl_code rl_session_map_image(const rl_sequence *sequence, const rl_frame *frame, int buffer, rl_sink_image *out,
                              rl_memory **memory, rl_error *err);
+
+/* session_shard.c: checks the options of shards and counts frames. */
+rl_code rl_session_count(rl_session *session, rl_error *err);
 
 /* session_memory.c: bytes that a run of a sequence allocates at most with so many frames in flight, saturating: the
  * plan's buffers, and what reading, writing and checkpoints take besides. 0 when the size is not known (frames in
