@@ -5,6 +5,7 @@
 #   make             build build/relit, build/librelit.a, build/librelit.so and the modules
 #   make test-asan   the tests under AddressSanitizer and UndefinedBehaviorSanitizer
 #   make fuzz        changed inputs against parsers and readers, FUZZ_SECONDS=60 each
+#   make soak        2,000 frames: memory flat, nothing leaked
 #   make bench       kernels and codecs against their peers
 #   make temporal    CAPTURES="folders": temporal anti-aliasing against the truth, and its flicker: tables and strips
 #   make accuracy    TRUTH=folder: every model against a path-traced truth (tests/accuracy.c)
@@ -165,6 +166,15 @@ fuzz: deps
 	@$(MAKE) --no-print-directory -j2 $(ASAN) build-asan/tests/fuzz/fuzz
 	@ASAN_OPTIONS=detect_leaks=0 build-asan/tests/fuzz/fuzz --seconds $(FUZZ_SECONDS) --seed $(FUZZ_SEED)
 
+# 2,000 frames: memory flat, no file left open. `make test` runs 120 of them.
+soak:
+	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/test_batch
+	RELIT_SOAK_FRAMES=$(or $(FRAMES),2000) $(BUILD)/tests/test_batch
+
+# A real one-node Slurm on the loopback address; needs slurm-wlm, munge and root.
+slurm-test: all
+	BUILD=$(BUILD) tests/slurm.sh
+
 # ---- the rest --------------------------------------------------------------------------------------------------
 
 DEB = build-essential pkg-config libopenexr-dev libopenimageio-dev libopencolorio-dev pocl-opencl-icd ocl-icd-opencl-dev \
@@ -215,4 +225,4 @@ layers:
 clean:
 	rm -rf $(BUILD) build-asan
 
-.PHONY: all demo bench test test-build test-asan deps install format format-check layers clean fuzz accuracy temporal
+.PHONY: all demo bench test test-build test-asan deps install format format-check layers clean fuzz accuracy soak slurm-test temporal

@@ -13,6 +13,7 @@
 #ifndef RL_RELIT_H
 #define RL_RELIT_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -61,6 +62,10 @@ typedef struct rl_options {
     const char *device;    /* "cpu", "gpu", a number; NULL = a CPU device if there is one */
     uint64_t memory_limit; /* bytes; 0 = none */
     rl_on_missing on_missing;
+    bool resume;           /* frames whose pictures are there, made of the same inputs by the same pipeline, stay */
+    int shard[2];          /* {I, N}: the I-th of N parts, from 1; N = 0: everything */
+    int preroll;           /* frames of warm-up before a shard's first; 0 = history comes from the shard before it */
+    int checkpoint_frames; /* a checkpoint of history every so many frames; 0 = by what one costs */
     const char *ocio; /* OpenColorIO config; NULL = the pipeline's, else $OCIO, else relit's own */
     const rl_log *log;
 } rl_options;
@@ -88,6 +93,28 @@ rl_code rl_session_plan(const rl_session *session, size_t capture, rl_plan_forma
                         rl_error *err);
 void rl_text_free(char *text);
 
+/* What a run with options.shard does to a capture. */
+typedef struct rl_shard_part {
+    size_t n;                    /* frames that it writes; 0: none, and nothing below counts */
+    long long first, last;       /* the first and the last of them */
+    bool history;                /* the graph keeps history */
+    size_t preroll;              /* frames of warm-up before them, fewer than asked for behind a cut: then exact */
+    bool exact;                  /* the pictures are those of one run over all frames, bit for bit */
+    bool takes_over, hands_over; /* history, from the checkpoint after frame `from`; after its last frame */
+    long long from;
+} rl_shard_part;
+void rl_session_shard(const rl_session *session, size_t capture, rl_shard_part *out);
+
+/* A node that keeps history: the least share that a frame has in its result, < 0 when the pass does not say. What lies
+ * before K frames of warm-up then has at most the share (1 - least)^(K+1) in the first picture behind them. */
+typedef struct rl_fading {
+    const char *node, *pass;
+    double least;
+    const char *where; /* where that holds; NULL when least < 0 */
+} rl_fading;
+/* The i-th of a capture's live nodes with history; false when there is none. */
+bool rl_session_fading(const rl_session *session, size_t capture, size_t i, rl_fading *out);
+
 /* ---- processing files ------------------------------------------------------------------------------------
  */
 
@@ -104,15 +131,31 @@ typedef struct rl_frame_result {
     size_t done, total;            /* frames of the whole run, this one included */
 } rl_frame_result;
 
+/* What took which time: a stage of a frame (category "read", "run", "write", "checkpoint"), an output that was written
+ * ("encode"), or a step on the device ("kernel", "colour", "convert", "copy"). */
+typedef enum rl_lane { RL_LANE_READ, RL_LANE_RUN, RL_LANE_DEVICE, RL_LANE_WRITE, RL_LANES } rl_lane;
+
+typedef struct rl_run_span {
+    rl_lane lane; /* the thread, or the device's queue; spans of one lane nest or follow each other */
+    const char *category, *name, *capture; /* live during the callback */
+    long long frame;
+    uint64_t start, end; /* ns on CLOCK_MONOTONIC */
+} rl_run_span;
+
 typedef struct rl_run_hooks {
     void (*frame)(void *ctx, const rl_frame_result *result); /* in order of completion, one at a time */
     int (*stop)(void *ctx); /* asked before each frame: nonzero finishes the frames in flight and returns
                                RL_E_CANCELLED */
     void *ctx;
+    /* What happens meanwhile; may be NULL. Any thread; span several at a time. */
+    void (*stage)(void *ctx, rl_lane lane, long long frame); /* begins to read, run or write a frame */
+    void (*span)(void *ctx, const rl_run_span *span);        /* has ended */
 } rl_run_hooks;
 
 typedef struct rl_run_summary {
     size_t frames, failed;
+    size_t skipped; /* frames that a resumed run found done */
+    bool lacking;   /* the shard before this one has not handed over its history yet: nothing was written */
     uint64_t nonfinite, clamped, clipped;
     size_t peak_bytes; /* the most that relit had allocated, device buffers included */
 } rl_run_summary;

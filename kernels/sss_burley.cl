@@ -31,7 +31,7 @@
 
 enum { ROTATION_NONE = 0, ROTATION_WHITE = 1, ROTATION_IGN = 2, ROTATION_BLUE = 3 };
 
-#if P_weighting == WEIGHTING_AREA
+#if P_weighting != WEIGHTING_PLAIN
 #define AREA(x) x
 #else
 #define AREA(x)
@@ -51,6 +51,7 @@ typedef struct group_t {
     float fall[3];    /* exponents of 2 a unit of r_u: -d_max / (3 d ln 2) */
     float turn[2];    /* cos, sin of the pattern's turn */
     uint spread;      /* which pattern: share of 2³² of the patterns there are */
+    plane_t plane;    /* tangent to each lane's surface */
     float squeeze[3]; /* xx, xy, yy: from the disk to the screen's plane, less the identity */
     int material;
     intv keep; /* all bits: samples that are none count as black */
@@ -88,10 +89,11 @@ static inline uint2 pattern_choice(int rotation, int seed, int number, int px, i
     return choice + (uint2)(rl_hash((uint)seed, 0, 0, 1), rl_hash((uint)seed, 0, 0, 2));
 }
 
-/* Taps first…first+n-1, n <= TAP_BLOCK: index of the vector, radius² in units of d, weight. There are RL_W
- * more indices behind the last, for looking ahead. */
+/* Taps first…first+n-1, n <= TAP_BLOCK: index of the vector, radius² in units of d, weight, and for
+ * weighting: surface how many pixels away, x before y. There are RL_W more indices behind the last, for
+ * looking ahead. */
 static inline void place_taps(const inputs_t *in, const group_t *g, constant float *taps, int stride,
-                              int first, int n, int *at, float *r2, float *weight)
+                              int first, int n, int *at, float *r2, float *weight, int *shift)
 {
     const float magic = 12582912.0f;
     constant frame_t *f = in->f;
@@ -108,6 +110,10 @@ static inline void place_taps(const inputs_t *in, const group_t *g, constant flo
 #endif
         intv dx = rl_as_intv(fma(u, (floatv)g->k[0], (floatv)magic)) - as_int(magic);
         intv dy = rl_as_intv(fma(v, (floatv)g->k[1], (floatv)magic)) - as_int(magic);
+#if P_weighting == WEIGHTING_SURFACE
+        rl_vstore(dx, 0, shift + i);
+        rl_vstore(dy, 0, shift + TAP_BLOCK + i);
+#endif
         dx += g->v.px;
         dy += g->v.py;
         intv row = (dy >> 2) + g->v.sy;
@@ -144,6 +150,18 @@ static inline int pattern_count(int n)
     return fit > MOST_PATTERNS ? MOST_PATTERNS : (fit - 1) | 1;
 }
 
+/* A tap's weights for the three channels, of the lanes in `counts`: `share` times R(sqrt(r2 + dz²)) without
+ * its constant factors; lengths in units of the largest d. */
+static inline void weigh_tap(const group_t *g, floatv r2, floatv dz, floatv share, intv counts, floatv w[3])
+{
+    floatv q = fma(dz, dz, r2), ir = rsqrt(q), r = q * ir;
+    floatv common = scatter_keep(ir * share, counts);
+    for (int c = 0; c < 3; c++) {
+        floatv e = weight_exp2(r * g->fall[c]);
+        w[c] = fma(e, e, (floatv)1.0f) * (e * common);
+    }
+}
+
 /* Weighted means of n taps, whose patterns start at `taps`; lanes without a sample keep what `out` holds. */
 static inline void sum_taps(const inputs_t *in, const group_t *g, constant float *taps, int n, floatv out[3])
 {
@@ -152,33 +170,48 @@ static inline void sum_taps(const inputs_t *in, const group_t *g, constant float
     floatv w0 = 0.0f, w1 = 0.0f, w2 = 0.0f, c0 = 0.0f, c1 = 0.0f, c2 = 0.0f;
     int at[TAP_BLOCK + RL_W];
     float r2[TAP_BLOCK], weight[TAP_BLOCK];
+    int shift[2 * TAP_BLOCK];
+#if P_weighting == WEIGHTING_SURFACE
+    floatv p0 = 0.0f, p1 = 0.0f, p2 = 0.0f;
+#endif
     AREA(floatv per_own = 1.0f / rl_vload(0, in->area + g->v.at);)
     for (int first = 0; first < n; first += TAP_BLOCK) {
         int last = min(TAP_BLOCK, n - first);
-        place_taps(in, g, taps, stride, first, last, at, r2, weight);
+        place_taps(in, g, taps, stride, first, last, at, r2, weight, shift);
         for (int i = 0; i < AHEAD; i++)
             fetch_tap(in, at[i]);
         for (int i = 0; i < last; i++) {
             int a = at[i];
             fetch_tap(in, at[i + AHEAD]);
-            intv same = rl_as_intv(rl_vload(0, in->stencil + a)) == g->material;
-            floatv dz = scatter_keep((rl_vload(0, in->depth + a) - g->z) * g->inv_d, same);
-            floatv q = fma(dz, dz, g->scale2 * r2[i]), ir = rsqrt(q), r = q * ir;
-            floatv common = scatter_keep(ir * weight[i], same | g->keep);
-            AREA(common *= rl_select((floatv)1.0f, rl_vload(0, in->area + a) * per_own, same);)
-            floatv e0 = weight_exp2(r * g->fall[0]), e1 = weight_exp2(r * g->fall[1]),
-                   e2 = weight_exp2(r * g->fall[2]);
-            e0 = fma(e0, e0, (floatv)1.0f) * (e0 * common);
-            e1 = fma(e1, e1, (floatv)1.0f) * (e1 * common);
-            e2 = fma(e2, e2, (floatv)1.0f) * (e2 * common);
-            w0 += e0;
-            w1 += e1;
-            w2 += e2;
-            c0 = fma(e0, scatter_keep(rl_vload(0, in->diffuse + a), same), c0);
-            c1 = fma(e1, scatter_keep(rl_vload(0, in->diffuse + plane + a), same), c1);
-            c2 = fma(e2, scatter_keep(rl_vload(0, in->diffuse + 2 * plane + a), same), c2);
+            intv id = rl_as_intv(rl_vload(0, in->stencil + a)), same = id == g->material;
+            floatv other = rl_vload(0, in->depth + a), dz = scatter_keep((other - g->z) * g->inv_d, same);
+#if P_weighting == WEIGHTING_SURFACE
+            int x = shift[i], y = shift[TAP_BLOCK + i];
+            floatv flat = g->plane.x * (float)x + g->plane.y * (float)y, p[3];
+            intv away = scatter_turned_away(in, &g->v, x, y, id, other, g->z + flat);
+            floatv plane_dz = flat * g->inv_d;
+            dz = rl_select(plane_dz, dz, same);
+            weigh_tap(g, g->scale2 * r2[i], plane_dz, weight[i], same | away | g->keep, p);
+            p0 += p[0];
+            p1 += p[1];
+            p2 += p[2];
+#endif
+            floatv share = weight[i], e[3];
+            AREA(share *= rl_select((floatv)1.0f, rl_vload(0, in->area + a) * per_own, same);)
+            weigh_tap(g, g->scale2 * r2[i], dz, share, same | g->keep, e);
+            w0 += e[0];
+            w1 += e[1];
+            w2 += e[2];
+            c0 = fma(e[0], scatter_keep(rl_vload(0, in->diffuse + a), same), c0);
+            c1 = fma(e[1], scatter_keep(rl_vload(0, in->diffuse + plane + a), same), c1);
+            c2 = fma(e[2], scatter_keep(rl_vload(0, in->diffuse + 2 * plane + a), same), c2);
         }
     }
+#if P_weighting == WEIGHTING_SURFACE
+    c0 *= fma(g->plane.cosine, w0 / p0 - 1.0f, (floatv)1.0f);
+    c1 *= fma(g->plane.cosine, w1 / p1 - 1.0f, (floatv)1.0f);
+    c2 *= fma(g->plane.cosine, w2 / p2 - 1.0f, (floatv)1.0f);
+#endif
     out[0] = rl_select(out[0], c0 / w0, w0 > MIN_WEIGHT);
     out[1] = rl_select(out[1], c1 / w1, w1 > MIN_WEIGHT);
     out[2] = rl_select(out[2], c2 / w2, w2 > MIN_WEIGHT);
@@ -263,6 +296,9 @@ static inline void filter_material(const inputs_t *in, const vector_t *v, consta
     g.turn[0] = tables[TABLE_TURNS + 2 * turn];
     g.turn[1] = tables[TABLE_TURNS + 2 * turn + 1];
     g.spread = choice.y;
+#if P_weighting == WEIGHTING_SURFACE
+    g.plane = scatter_plane(in, v, g.z);
+#endif
     g.material = material;
     g.keep = mat->profile_border == BORDER_OCCLUDE ? -1 : 0;
     while (scatter_any(mine)) { /* once as a rule, more at silhouettes */

@@ -5,6 +5,7 @@
 
 typedef struct sums_t {
     floatv w[3], c[3]; /* weights; weights times light */
+    floatv p[3];       /* weighting: surface: weights on the tangent plane */
 } sums_t;
 
 /* What is constant for the pixels of one vector and one material. */
@@ -12,6 +13,7 @@ typedef struct centre_t {
     vector_t v;
     floatv z;
     floatv tilt_x, tilt_y; /* of the disk, depth a metre of the screen's plane */
+    plane_t plane;         /* tangent */
     float d[3];
     float reach;
     float px, py; /* a pixel's size on the plane z = -1 */
@@ -64,6 +66,18 @@ static inline void burley_own(const centre_t *at, floatv w[3])
     }
 }
 
+/* The weights of the pixels (dx, dy) away, r2 = the square of that distance on screen. */
+static inline void weigh(const centre_t *at, int dx, int dy, floatv r2, floatv dz, floatv w[3])
+{
+    int ring = max(abs(dx), abs(dy));
+    if (ring == 0)
+        burley_own(at, w);
+    else if (ring <= 2)
+        burley_square(at, dx, dy, dz * dz, ring == 1 ? 6 : 3, w);
+    else
+        burley(fma(dz, dz, r2), at->d, w);
+}
+
 /* The pixels (dx, dy) away join the sums of the lanes in `mine`. */
 static inline void gather(const inputs_t *in, const centre_t *at, int dx, int dy, intv mine, sums_t *s)
 {
@@ -74,24 +88,30 @@ static inline void gather(const inputs_t *in, const centre_t *at, int dx, int dy
     disk2 += z2 * rise * rise;
 #endif
     int i = scatter_at(in->f, &at->v, dx, dy);
-    intv near = mine & (disk2 <= at->reach * at->reach);
-    intv same = near & (rl_as_intv(rl_vload(0, in->stencil + i)) == at->material),
-         counts = near & (same | at->keep);
+    intv near = mine & (disk2 <= at->reach * at->reach), id = rl_as_intv(rl_vload(0, in->stencil + i));
+    intv same = near & (id == at->material), counts = near & (same | at->keep);
+    floatv other = rl_vload(0, in->depth + i), dz = scatter_keep(other - at->z, same), w[3];
+#if P_weighting == WEIGHTING_SURFACE
+    floatv flat = at->plane.x * (float)dx + at->plane.y * (float)dy, p[3];
+    intv away = scatter_turned_away(in, &at->v, dx, dy, id, other, at->z + flat);
+    intv planar = near & (same | at->keep | away);
+    if (!scatter_any(planar))
+        return;
+    dz = rl_select(flat, dz, same);
+    weigh(at, dx, dy, r2, flat, p);
+    floatv own = rl_vload(0, in->area + at->v.at);
+    for (int c = 0; c < 3; c++)
+        s->p[c] += scatter_keep(p[c] * own, planar);
+#else
     if (!scatter_any(counts))
         return;
-    floatv dz = scatter_keep(rl_vload(0, in->depth + i) - at->z, same), w[3];
-    int ring = max(abs(dx), abs(dy));
-    if (ring == 0)
-        burley_own(at, w);
-    else if (ring <= 2)
-        burley_square(at, dx, dy, dz * dz, ring == 1 ? 6 : 3, w);
-    else
-        burley(fma(dz, dz, r2), at->d, w);
-#if P_weighting == WEIGHTING_AREA
+#endif
+    weigh(at, dx, dy, r2, dz, w);
+#if P_weighting != WEIGHTING_PLAIN
     floatv surface = rl_select(rl_vload(0, in->area + at->v.at), rl_vload(0, in->area + i), same);
 #endif
     for (int c = 0; c < 3; c++) {
-#if P_weighting == WEIGHTING_AREA
+#if P_weighting != WEIGHTING_PLAIN
         w[c] *= surface;
 #endif
         w[c] = scatter_keep(w[c], counts);
@@ -119,20 +139,31 @@ static inline void filter_material(const inputs_t *in, const vector_t *v, int ma
     at.reach = BURLEY_RADIUS * fmax(at.d[0], fmax(at.d[1], at.d[2]));
     float nearest = scatter_nearest(at.z, mine);
     int ry = (int)fmin(at.reach / (nearest * at.py), 16384.0f);
-    sums_t total = {{0.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 0.0f}};
+#if P_weighting == WEIGHTING_SURFACE
+    at.plane = scatter_plane(in, v, at.z);
+#endif
+    sums_t total = {{0.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 0.0f}};
     for (int dy = -ry; dy <= ry; dy++) {
         float y = (float)dy * at.py * nearest;
         int rx = (int)fmin(sqrt(fmax(at.reach * at.reach - y * y, 0.0f)) / (nearest * at.px), 16384.0f) + 1;
-        sums_t row = {{0.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 0.0f}}; /* rows first: less is lost to rounding */
+        sums_t row = {{0.0f, 0.0f, 0.0f},
+                      {0.0f, 0.0f, 0.0f},
+                      {0.0f, 0.0f, 0.0f}}; /* rows first: less is lost to rounding */
         for (int dx = -rx; dx <= rx; dx++)
             gather(in, &at, dx, dy, mine, &row);
         for (int c = 0; c < 3; c++) {
             total.w[c] += row.w[c];
             total.c[c] += row.c[c];
+            total.p[c] += row.p[c];
         }
     }
-    for (int c = 0; c < 3; c++)
-        out[c] = rl_select(out[c], total.c[c] / total.w[c], mine & (total.w[c] > 0.0f));
+    for (int c = 0; c < 3; c++) {
+        floatv over = 1.0f / total.w[c];
+#if P_weighting == WEIGHTING_SURFACE
+        over = fma(at.plane.cosine, 1.0f / total.p[c] - over, over);
+#endif
+        out[c] = rl_select(out[c], total.c[c] * over, mine & (total.w[c] > 0.0f));
+    }
 }
 
 kernel void sss_reference_filter(SCATTER_PORTS)
@@ -156,7 +187,7 @@ kernel void sss_reference_filter(SCATTER_PORTS)
 
 kernel void sss_reference_area(SCATTER_PORTS)
 {
-#if P_weighting == WEIGHTING_AREA
+#if P_weighting != WEIGHTING_PLAIN
     scatter_area(depth, stencil, area, f);
 #endif
 }

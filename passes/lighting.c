@@ -20,7 +20,7 @@ static const rl_param profile_keys[] = {
     M(RL_F32, transmittance_distance_mm, 1e-3, 1e6, 1, "mm", "beer_lambert: where transmittance_color holds"),
     M(RL_RGBF, sg_variance_mm2, 1e-8, 1e8, -1, "mm2",
       "diffuse: sg: variance of the scattering along an axis; not given: 7 d^2, that of Burley's profile",
-      .source = "MJP", .no_default = true),
+      .source = "MJP", .no_default = true, .needed_by = "diffuse: sg", .instead = "scatter_distance_mm"),
 };
 
 static const rl_param material_keys[] = {

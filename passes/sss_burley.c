@@ -17,8 +17,9 @@ static const rl_param params[] = {
     P_ENUM(sss_burley_params, orientation, "screen|tangent", 0,
            "the disk is parallel to the screen, or to the tangent plane that the depth gives",
            .structural = true),
-    P_ENUM(sss_burley_params, weighting, "area|plain", 0,
-           "what a sample stands for: the surface that its pixel sees, or its pixel alone",
+    P_ENUM(sss_burley_params, weighting, "area|plain|surface", 0,
+           "what a sample stands for: the surface that its pixel sees, or its pixel alone; surface: not "
+           "normalized, so that hollows send back more and bumps less",
            .structural = true),
     P_ENUM(sss_burley_params, rotation, "none|white|ign|blue", 3,
            "how the pattern changes from pixel to pixel and from frame to frame; blue: neighbours complement each other"),

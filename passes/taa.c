@@ -37,6 +37,11 @@ static const rl_port ports[] = {
 
 static const rl_step steps[] = {{"taa", .domain = RL_EVERY_VECTOR}};
 
+static double least_share(const void *values)
+{
+    return (double)((const taa_params *)values)->blend;
+}
+
 const rl_pass rl_pass_taa = {
     .name = "taa",
     .help = "temporal anti-aliasing with variance clipping",
@@ -47,4 +52,7 @@ const rl_pass rl_pass_taa = {
     .params_size = sizeof(taa_params),
     .ports = RL_ARRAY(ports),
     .steps = RL_ARRAY(steps),
+    .least_share = least_share,
+    .fades_where = "where history is neither clipped, nor resampled, nor a firefly; elsewhere it lies in the colour box of "
+                   "the pixel's 3x3 neighbours whatever came before, so that no two runs differ by more than that box",
 };

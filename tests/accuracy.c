@@ -114,7 +114,14 @@ static bool find_models(models *all)
             continue;
         snprintf(model.name, sizeof model.name, "%s", pass->name);
         snprintf(model.sss, sizeof model.sss, "pass: %s", pass->name);
+        bool mixture = row_named(pass->profile_keys, "gaussians") ||
+                       !row_named(pass->profile_keys, "scatter_distance_mm");
         ok = expand(all, pass, 0, &model);
+        if (ok && mixture) { /* published sets, then those that were fitted to d */
+            snprintf(model.name, sizeof model.name, "%s, fitted to d,", pass->name);
+            model.set = "fitted";
+            ok = expand(all, pass, 0, &model);
+        }
     }
     const rl_pass *lighting = rl_pass_find("lighting");
     const rl_param *diffuse = lighting ? row_named(lighting->shading_keys, "diffuse") : NULL;

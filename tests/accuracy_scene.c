@@ -128,7 +128,7 @@ static const char *write_manifest(accuracy_scene *s, accuracy_lit lit, double un
     return code ? NULL : path;
 }
 
-enum { SETTINGS = 4 + 3 * ACCURACY_MATERIALS };
+enum { SETTINGS = 5 + 4 * ACCURACY_MATERIALS };
 
 /* What the model changes in configs/accuracy.yaml. Returns the number of settings. */
 static size_t choose(accuracy_scene *s, const accuracy_model *model, rl_setting *to)
@@ -139,17 +139,24 @@ static size_t choose(accuracy_scene *s, const accuracy_model *model, rl_setting 
         "graph.sss", rl_arena_printf(a, "{%s, in: {diffuse: light.diffuse, lit: light.lit}}", model->sss)};
     to[n++] = (rl_setting){"shading.diffuse", model->shading[0] ? model->shading : "lambert"};
     to[n++] = (rl_setting){"shading.transmission", model->thickness[0] ? "true" : "false"};
+    if (!strcmp(model->shading, "sg")) {
+        to[n++] = (rl_setting){"graph.bend", "{pass: curvature}"};
+        to[n++] =
+            (rl_setting){"graph.light.in", "{curvature: bend.curvature, smooth_normal: bend.smooth_normal}"};
+    }
     for (const accuracy_material *m = s->materials; m < s->materials + s->n_materials; m++) {
         if (m->d_mm[0] <= 0)
             continue;
+        const char *profile =
+            rl_arena_printf(a, "%s%s%s", m->name, model->set ? "_" : "", model->set ? model->set : "");
         to[n++] = (rl_setting){rl_arena_printf(a, "materials.%s", m->name),
-                               rl_arena_printf(a, "{profile: %s}", m->name)};
-        to[n++] = (rl_setting){rl_arena_printf(a, "profiles.%s.scatter_distance_mm", m->name),
+                               rl_arena_printf(a, "{profile: %s}", profile)};
+        to[n++] = (rl_setting){rl_arena_printf(a, "profiles.%s.scatter_distance_mm", profile),
                                rl_arena_printf(a, "[%.9g, %.9g, %.9g]", m->d_mm[0], m->d_mm[1], m->d_mm[2])};
         if (model->thickness[0]) {
-            to[n++] = (rl_setting){rl_arena_printf(a, "profiles.%s.transmission", m->name), "thick"};
+            to[n++] = (rl_setting){rl_arena_printf(a, "profiles.%s.transmission", profile), "thick"};
             to[n++] =
-                (rl_setting){rl_arena_printf(a, "profiles.%s.thickness_from", m->name), model->thickness};
+                (rl_setting){rl_arena_printf(a, "profiles.%s.thickness_from", profile), model->thickness};
         }
     }
     return n;
@@ -171,7 +178,7 @@ static bool copy_image(rl_session *session, const char *image, int planes, float
 /* A session for the model, its frames processed; NULL after a failure. */
 static rl_session *run(accuracy_scene *s, const accuracy_model *model, accuracy_lit lit)
 {
-    rl_setting settings[SETTINGS + ACCURACY_MATERIALS];
+    rl_setting settings[SETTINGS];
     const char *manifest = write_manifest(s, lit, model->unit), *only = model->settled ? "settled" : "still";
     rl_options options = {.pipeline = "configs/accuracy.yaml",
                           .captures = &manifest,

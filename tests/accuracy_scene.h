@@ -63,6 +63,7 @@ typedef struct accuracy_model {
     char name[96];
     char sss[160];      /* "pass: sss_burley, taps: 55" */
     char shading[32];   /* shading.diffuse, "" = lambert */
+    const char *set;    /* of profiles: NAME_set is used for material NAME; NULL = NAME itself */
     char thickness[16]; /* thickness_from of thick transmission, "" = none */
     double unit;        /* metres a unit of the capture's lengths; 0 = 1 */
     bool settled;       /* ACCURACY_FRAMES frames of TAA, not one frame */

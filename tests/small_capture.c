@@ -159,7 +159,8 @@ static void check_exr(const char *path)
     if (rl_exr_open(path, 0, &file, &err))
         fail_msg("%s: %s", path, err.text);
     const rl_exr_part *part = rl_exr_part_at(file, 0);
-    assert_int_equal(part->width * part->height, W * H);
+    if (part->width != W || part->height != H)
+        fail_msg("%s has %d x %d pixels", path, part->width, part->height);
     for (size_t i = 0; i < part->n_channels; i++) {
         rl_exr_plane plane = {.channel = part->channels[i].name, .floats = pixels, .stride = W};
         if (rl_exr_read(file, 0, &plane, 1, NULL, NULL, &err))
@@ -175,7 +176,8 @@ static void check_image(const char *path)
     rl_error err = {0};
     if (rl_image_file_read(path, &file, &err))
         fail_msg("%s: %s", path, err.text);
-    assert_int_equal(file.width * file.height, W * H);
+    if (file.width != W || file.height != H)
+        fail_msg("%s has %d x %d pixels", path, file.width, file.height);
     rl_image_file_free(&file);
 }
 
@@ -192,7 +194,7 @@ int small_check_files(const char *out)
             check_exr(path);
         else if (dot && !strcmp(dot, ".png") && ++n)
             check_image(path);
-        else if (strcmp(e->d_name, ".") && strcmp(e->d_name, ".."))
+        else if (strcmp(e->d_name, ".") && strcmp(e->d_name, "..") && strcmp(e->d_name, ".relit"))
             fail_msg("%s was left behind", path);
         free(path);
     }

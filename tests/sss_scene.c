@@ -150,7 +150,8 @@ double sss_worst(sss_scene *s, int taps, int weighting, int step)
 {
     double worst = 0;
     int count = 0;
-    s->twin.area = weighting == AREA;
+    s->twin.area = weighting != PLAIN;
+    s->twin.surface = weighting == SURFACE;
     SSS_EACH_PIXEL(s, x, y, i)
     {
         double filtered[3] = {0}, color[3];

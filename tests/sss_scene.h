@@ -16,7 +16,7 @@ typedef struct sss_reference_params {
     int32_t orientation, weighting;
 } sss_reference_params;
 enum { SCREEN = 0, TANGENT = 1 };
-enum { AREA = 0, PLAIN = 1, AUTO = -1 };
+enum { AREA = 0, PLAIN = 1, SURFACE = 2, AUTO = -1 };
 
 extern cl_session *sss_session; /* between sss_open and sss_close: a group's set-up and tear-down */
 extern int sss_width;           /* of the vectors; 0 = as always */

@@ -72,6 +72,39 @@ static double slope(const twin_scene *s, int x, int y, int dx, int dy)
     return best;
 }
 
+/* Mean of the slopes to both neighbours, weighting: surface; metres of depth a pixel. In float: it decides
+ * what is behind the plane. */
+static float mean_slope(const twin_scene *s, int x, int y, int dx, int dy)
+{
+    const camera_t *c = &s->frame.camera;
+    uint32_t id = s->stencil[at(s, x, y)];
+    float z = s->depth[at(s, x, y)], most = z * (10 / c->focal[dx ? 0 : 1]), sum = 0;
+    int n = 0;
+    for (int sign = 1; sign >= -1; sign -= 2) {
+        int nx = x + sign * dx, ny = y + sign * dy;
+        if (material_at(s, nx, ny) != id)
+            continue;
+        float d = (float)sign * (s->depth[at(s, nx, ny)] - z);
+        if (fabsf(d) > most)
+            continue;
+        sum += d;
+        n++;
+    }
+    return n == 2 ? sum / 2 : sum;
+}
+
+/* Whether pixel (px, py) shows that the surface of (x, y) has turned away before; at_plane: the plane's
+ * depth. */
+static bool turned_away(const twin_scene *s, int px, int py, uint32_t id, float at_plane)
+{
+    const int *v = s->frame.valid;
+    const float *focal = s->frame.camera.focal;
+    if (px < v[0] || py < v[1] || px >= v[2] || py >= v[3] || material_at(s, px, py) == id)
+        return false;
+    return material_at(s, px, py) == 0 ||
+           s->depth[at(s, px, py)] > fmaf(at_plane, 2 / fminf(focal[0], focal[1]), at_plane);
+}
+
 /* Slopes of the disk, depth a metre of the screen's plane. In float: they decide where taps land. */
 static void tilt(const twin_scene *s, int x, int y, float t[2])
 {
@@ -90,13 +123,30 @@ double twin_area(const twin_scene *s, int x, int y)
     const camera_t *c = &f->camera;
     if (!s->area)
         return 1;
-    double z = s->depth[at(s, x, y)], zx = slope(s, x, y, 1, 0), zy = slope(s, x, y, 0, 1);
+    double z = s->depth[at(s, x, y)], zx = s->surface ? mean_slope(s, x, y, 1, 0) : slope(s, x, y, 1, 0);
+    double zy = s->surface ? mean_slope(s, x, y, 0, 1) : slope(s, x, y, 0, 1);
     double rx = (x + f->origin[0] + 0.5 + c->jitter[0] - c->centre[0]) / c->focal[0];
     double ry = -(y + f->origin[1] + 0.5 + c->jitter[1] - c->centre[1]) / c->focal[1];
     double a[3] = {z / c->focal[0] + rx * zx, ry * zx, -zx},
            b[3] = {rx * zy, -z / c->focal[1] + ry * zy, -zy};
     double n[3] = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
     return sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+}
+
+/* weighting: surface. The plane's slopes, and the share of its weights in the result. */
+typedef struct tangent_t {
+    float x, y;
+    double cosine;
+} tangent_t;
+
+static tangent_t tangent_of(const twin_scene *s, int x, int y)
+{
+    const camera_t *c = &s->frame.camera;
+    tangent_t t = {mean_slope(s, x, y, 1, 0), mean_slope(s, x, y, 0, 1), 0};
+    double z = s->depth[at(s, x, y)];
+    if (s->surface)
+        t.cosine = 1 / sqrt(1 + pow(t.x * c->focal[0] / z, 2) + pow(t.y * c->focal[1] / z, 2));
+    return t;
 }
 
 /* ---- the dense sum ---- */
@@ -148,7 +198,8 @@ void twin_reference(const twin_scene *s, int x, int y, double filtered[3])
     uint32_t id = s->stencil[at(s, x, y)];
     const twin_material *m = &s->materials[id];
     double z = s->depth[at(s, x, y)], hx = z / c->focal[0], hy = z / c->focal[1], d[3], most = 0;
-    double own = twin_area(s, x, y), sum[3] = {0}, weights[3] = {0};
+    double own = twin_area(s, x, y), sum[3] = {0}, weights[3] = {0}, planar[3] = {0};
+    tangent_t tangent = tangent_of(s, x, y);
     for (int i = 0; i < 3; i++) {
         d[i] = m->scatter_distance_mm[i] * 1e-3;
         most = fmax(most, d[i]);
@@ -162,9 +213,13 @@ void twin_reference(const twin_scene *s, int x, int y, double filtered[3])
             if (hypot(hypot(dx * hx, dy * hy), (double)t[0] * dx * hx + (double)t[1] * dy * hy) > reach)
                 continue;
             bool same = material_at(s, x + dx, y + dy) == id;
+            double flat = s->surface ? tangent.x * (float)dx + tangent.y * (float)dy : 0;
+            if (s->surface && (same || m->border || turned_away(s, x + dx, y + dy, id, (float)(z + flat))))
+                for (int i = 0; i < 3; i++)
+                    planar[i] += pixel_weight(dx, dy, hx, hy, flat, d[i]) * own;
             if (!same && m->border == 0)
                 continue;
-            double dz = same ? s->depth[at(s, x + dx, y + dy)] - z : 0;
+            double dz = same ? s->depth[at(s, x + dx, y + dy)] - z : flat;
             double area = same ? twin_area(s, x + dx, y + dy) : own;
             for (int i = 0; i < 3; i++) {
                 double w = pixel_weight(dx, dy, hx, hy, dz, d[i]) * area;
@@ -174,7 +229,8 @@ void twin_reference(const twin_scene *s, int x, int y, double filtered[3])
             }
         }
     for (int i = 0; i < 3; i++)
-        filtered[i] = sum[i] / weights[i];
+        filtered[i] =
+            sum[i] * ((1 - tangent.cosine) / weights[i] + (s->surface ? tangent.cosine / planar[i] : 0));
 }
 
 /* ---- taps ---- */
@@ -275,7 +331,8 @@ void twin_burley(const twin_scene *s, int x, int y, int n, int seed, double filt
     float co = (float)cos(2 * pi * floor(choice[0] * 256) / 256),
           si = (float)sin(2 * pi * floor(choice[0] * 256) / 256);
     double z = s->depth[at(s, x, y)], scale = z / middle, own = twin_area(s, x, y), sum[3] = {0},
-           weights[3] = {0};
+           weights[3] = {0}, planar[3] = {0};
+    tangent_t tangent = tangent_of(s, x, y);
     float *tx = rl_malloc((size_t)n * 12), *ty = tx + n, *tw = ty + n;
     rl_burley_taps((size_t)n, offset, tx, ty, tw);
     for (int i = 0; i < n; i++) {
@@ -285,10 +342,15 @@ void twin_burley(const twin_scene *s, int x, int y, int n, int seed, double filt
         v = fmaf(x_disk, xy, fmaf(v, yy, v));
         int px = x + (int)nearbyint((double)u * kx), py = y + (int)nearbyint((double)v * ky);
         bool same = material_at(s, px, py) == id;
+        double flat = s->surface ? tangent.x * (float)(px - x) + tangent.y * (float)(py - y) : 0;
+        double unit = most * 1e-3, r2 = ((double)u * u + (double)v * v) * scale * scale;
+        if (s->surface && (same || m->border || turned_away(s, px, py, id, (float)(z + flat))))
+            for (int k = 0; k < 3; k++)
+                planar[k] += rl_burley_profile(sqrt(r2 + flat * flat / (unit * unit)), d[k] / most) * 8 * pi *
+                             (d[k] / most) * tw[i];
         if (!same && m->border == 0)
             continue;
-        double dz = same ? (s->depth[at(s, px, py)] - z) / (most * 1e-3) : 0;
-        double r = sqrt(((double)u * u + (double)v * v) * scale * scale + dz * dz);
+        double dz = (same ? s->depth[at(s, px, py)] - z : flat) / unit, r = sqrt(r2 + dz * dz);
         double area = same ? twin_area(s, px, py) / own : 1;
         for (int k = 0; k < 3; k++) {
             double w = rl_burley_profile(r, d[k] / most) * 8 * pi * (d[k] / most) * tw[i] * area;
@@ -297,7 +359,9 @@ void twin_burley(const twin_scene *s, int x, int y, int n, int seed, double filt
                 sum[k] += w * s->diffuse[k * plane(s) + at(s, px, py)];
         }
     }
-    for (int k = 0; k < 3; k++)
-        filtered[k] = weights[k] > 1e-12 ? sum[k] / weights[k] : s->diffuse[k * plane(s) + at(s, x, y)];
+    for (int k = 0; k < 3; k++) {
+        double over = (1 - tangent.cosine) / weights[k] + (s->surface ? tangent.cosine / planar[k] : 0);
+        filtered[k] = weights[k] > 1e-12 ? sum[k] * over : s->diffuse[k * plane(s) + at(s, x, y)];
+    }
     rl_free(tx);
 }

@@ -22,7 +22,8 @@ typedef struct twin_scene {
     const twin_material *materials;
     const float *diffuse, *lit, *albedo, *normal, *depth;
     const uint32_t *stencil;
-    bool area;    /* weighting: area */
+    bool area;    /* weighting: area or surface */
+    bool surface; /* weighting: surface */
     bool tangent; /* orientation: tangent */
     int rotation; /* of sss_burley */
 } twin_scene;

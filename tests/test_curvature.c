@@ -7,205 +7,16 @@
 #include <stdio.h>
 #include <cmocka.h>
 
-#include "tests/shade_scene.h"
-
-extern const rl_pass rl_pass_curvature;
-
-/* Ports of the pass. */
-enum { NORMAL, DEPTH, STENCIL, CURVATURE, SMOOTH };
-
-typedef struct fixture {
-    shade_scene scene;
-    shade_image curvature;
-    shade_run run;
-    float radius_mm; /* the pass's only parameter */
-} fixture;
-
-static void make(fixture *t, int w, int h, int x0, int y0, uint64_t seed)
-{
-    assert_true(shade_scene_make(&t->scene, w, h, x0, y0, seed));
-    t->curvature = shade_image_new(&t->scene.frame, 1);
-    assert_non_null(t->curvature.data);
-    shade_params_default(&rl_pass_curvature, &t->radius_mm);
-    t->run = (shade_run){.pass = &rl_pass_curvature,
-                         .frame = t->scene.frame,
-                         .params = &t->radius_mm,
-                         .materials = &t->scene.materials,
-                         .images = {&t->scene.images[LIGHTING_NORMAL], &t->scene.images[LIGHTING_DEPTH],
-                                    &t->scene.images[LIGHTING_STENCIL], &t->curvature, &t->scene.color}};
-}
-
-static void done(fixture *t)
-{
-    shade_image_free(&t->curvature);
-    shade_scene_free(&t->scene);
-}
-
-static double dot(const double *a, const double *b)
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-static void normalize(double *v)
-{
-    double scale = 1 / sqrt(dot(v, v));
-    for (int i = 0; i < 3; i++)
-        v[i] *= scale;
-}
-
-static double get(const fixture *t, int port, int plane, int x, int y)
-{
-    return *shade_at(t->run.images[port], &t->run.frame, plane, x, y);
-}
-
-static void position(const fixture *t, int x, int y, double *p)
-{
-    double view[3], z = get(t, DEPTH, 0, x, y);
-    twin_ray(&t->run.frame, &t->run.frame.camera, x, y, view, p);
-    for (int i = 0; i < 3; i++)
-        p[i] *= z;
-}
-
-static void normal_at(const fixture *t, int x, int y, double *n)
-{
-    for (int i = 0; i < 3; i++)
-        n[i] = get(t, NORMAL, i, x, y);
-}
-
-static uint32_t id_at(const fixture *t, int x, int y)
-{
-    const frame_t *f = &t->run.frame;
-    bool inside = x >= f->valid[0] && y >= f->valid[1] && x < f->valid[2] && y < f->valid[3];
-    return inside ? shade_id(t->run.images[STENCIL], f, x, y) : 0;
-}
-
-/* ---- the twin ---------------------------------------------------------------------------------------------
- */
-
-typedef struct twin {
-    double pp[3][3], np[3][3], sum[3]; /* sums of dp dp^T and dn dp^T in world space, on the tangent plane */
-    bool close;                        /* a neighbour's test was decided by rounding */
-    double spread; /* smaller eigenvalue of pp over the trace: 0 where neighbours lie in a line */
-} twin;
-
-/* The window's radius in pixels: of the nearest point of 16 pixels. */
-static int radius_at(const fixture *t, int x, int y)
-{
-    double nearest = 1e30;
-    for (int i = x / 16 * 16; i < x / 16 * 16 + 16; i++)
-        if (id_at(t, i, y) && get(t, DEPTH, 0, i, y) > 0)
-            nearest = fmin(nearest, get(t, DEPTH, 0, i, y));
-    double pixels = 1e-3 * t->radius_mm * t->run.frame.camera.focal[0] / nearest;
-    return (int)(fmin(fmax(pixels, 1), 64) + 0.5);
-}
-
-static void project(double *v, const double *n)
-{
-    double along = dot(v, n);
-    for (int i = 0; i < 3; i++)
-        v[i] -= along * n[i];
-}
-
-static void twin_add(const fixture *t, twin *w, int x, int y, int dx, int dy)
-{
-    double n[3], p[3], n1[3], p1[3], mean[3];
-    if (id_at(t, x + dx, y + dy) != id_at(t, x, y) || get(t, DEPTH, 0, x + dx, y + dy) <= 0)
-        return;
-    normal_at(t, x, y, n);
-    normal_at(t, x + dx, y + dy, n1);
-    position(t, x, y, p);
-    position(t, x + dx, y + dy, p1);
-    for (int i = 0; i < 3; i++) {
-        mean[i] = n[i] + n1[i];
-        p1[i] -= p[i];
-    }
-    double turn = dot(n, n1), length = sqrt(dot(mean, mean) * dot(p1, p1)),
-           sine = fabs(dot(mean, p1)) / length;
-    w->close |= fabs(turn) < 1e-5 || fabs(sine - 0.5) < 1e-4;
-    if (turn <= 0 || sine > 0.5)
-        return;
-    for (int i = 0; i < 3; i++)
-        w->sum[i] += n1[i];
-    for (int i = 0; i < 3; i++)
-        n1[i] -= n[i];
-    project(n1, n);
-    project(p1, n);
-    for (int i = 0; i < 3; i++) {
-        for (int j = 0; j < 3; j++) {
-            w->pp[i][j] += p1[i] * p1[j];
-            w->np[i][j] += n1[i] * p1[j];
-        }
-    }
-}
-
-/* tr(N A)/tr(M A), A = (M + e)^-1, through eigenvectors of M on the tangent plane. */
-static double twin_curvature(twin *w, const double *n)
-{
-    double t[3] = {n[1], -n[0], 0}, b[3], axis[2][3], over = 0, under = 0, a = 0, c = 0, d = 0;
-    if (dot(t, t) < 1e-6)
-        t[0] = 1;
-    normalize(t);
-    for (int i = 0; i < 3; i++)
-        b[i] = n[(i + 1) % 3] * t[(i + 2) % 3] - n[(i + 2) % 3] * t[(i + 1) % 3];
-    for (int i = 0; i < 3; i++) {
-        for (int j = 0; j < 3; j++) {
-            a += t[i] * w->pp[i][j] * t[j];
-            d += t[i] * w->pp[i][j] * b[j];
-            c += b[i] * w->pp[i][j] * b[j];
-        }
-    }
-    w->spread = a + c > 0 ? (a * c - d * d) / ((a + c) * (a + c)) : 1;
-    double angle = 0.5 * atan2(2 * d, a - c), e = 1e-5 * (a + c);
-    if (a + c <= 0)
-        return 0;
-    for (int k = 0; k < 2; k++) {
-        double m = 0, along = 0;
-        for (int i = 0; i < 3; i++)
-            axis[k][i] = k ? -sin(angle) * t[i] + cos(angle) * b[i] : cos(angle) * t[i] + sin(angle) * b[i];
-        for (int i = 0; i < 3; i++) {
-            for (int j = 0; j < 3; j++) {
-                m += axis[k][i] * w->pp[i][j] * axis[k][j];
-                along += axis[k][i] * w->np[i][j] * axis[k][j];
-            }
-        }
-        over += along / (m + e);
-        under += m / (m + e);
-    }
-    return over / under;
-}
-
-static bool twin_at(const fixture *t, int x, int y, double *curvature, double *smooth, double *spread)
-{
-    twin w = {0};
-    double n[3];
-    int radius = radius_at(t, x, y);
-    normal_at(t, x, y, n);
-    for (int i = 0; i < 3; i++)
-        w.sum[i] = n[i];
-    for (int ring = 0; ring < 2; ring++) {
-        int r = ring ? (radius > 1 ? radius / 2 : 1) : radius, d = (int)(sqrt(0.5) * r + 0.5);
-        d = d > 1 ? d : 1;
-        for (int i = -1; i <= 1; i++)
-            for (int j = -1; j <= 1; j++)
-                if (i || j)
-                    twin_add(t, &w, x, y, i * (j ? d : r), j * (i ? d : r));
-    }
-    *curvature = twin_curvature(&w, n);
-    *spread = w.spread;
-    double length = sqrt(dot(w.sum, w.sum));
-    for (int i = 0; i < 3; i++)
-        smooth[i] = w.sum[i] / length;
-    return !w.close;
-}
+#include "tests/twin_curvature.h"
 
 /* Normals within 60 degrees of one another, so that a good part of the neighbours counts. */
-static void tame_normals(fixture *t, uint64_t seed)
+static void tame_normals(bend_scene *t, uint64_t seed)
 {
     const frame_t *f = &t->run.frame;
     for (int y = f->valid[1]; y < f->valid[3]; y++) {
         for (int x = f->valid[0]; x < f->valid[2]; x++) {
             double n[3] = {0.3 + shade_random(&seed), shade_random(&seed) - 0.5, 0.7};
-            normalize(n);
+            bend_normalize(n);
             for (int i = 0; i < 3; i++)
                 *shade_at(t->run.images[NORMAL], f, i, x, y) = (float)n[i];
         }
@@ -218,10 +29,10 @@ static void agrees_with_twin(void **state)
     static const float radii[] = {9, 3, 0.001f, 30};
     (void)state;
     for (size_t i = 0; i < 4; i++) {
-        fixture t;
+        bend_scene t;
         double worst = 0, worst_normal = 0;
         int skipped = 0, seen = 0, bent = 0;
-        make(&t, sizes[i][0], sizes[i][1], sizes[i][2], sizes[i][3], i + 70);
+        bend_make(&t, sizes[i][0], sizes[i][1], sizes[i][2], sizes[i][3], i + 70);
         const frame_t *f = &t.run.frame;
         if (i % 2 == 0)
             tame_normals(&t, i);
@@ -229,18 +40,18 @@ static void agrees_with_twin(void **state)
         assert_true(shade_execute(&t.run));
         for (int y = 0; y < f->rows; y++) {
             for (int x = 0; x < f->columns; x++) {
-                double want = 0, smooth[3] = {0, 0, 0}, spread = 1, got = get(&t, CURVATURE, 0, x, y);
-                if (id_at(&t, x, y) && !twin_at(&t, x, y, &want, smooth, &spread)) {
+                double want = 0, smooth[3] = {0, 0, 0}, spread = 1, got = bend_get(&t, CURVATURE, 0, x, y);
+                if (bend_id(&t, x, y) && !twin_bend(&t, x, y, &want, smooth, &spread)) {
                     skipped++;
                     continue;
                 }
-                seen += id_at(&t, x, y) != 0;
+                seen += bend_id(&t, x, y) != 0;
                 bent += want != 0;
                 /* rounding of pp is divided by the spread, or by the ridge */
                 worst =
                     fmax(worst, fabs(got - want) / fmax(fabs(want), 10) * fmin(spread + 1e-5, 1e-2) * 100);
                 for (int c = 0; c < 3; c++)
-                    worst_normal = fmax(worst_normal, fabs(get(&t, SMOOTH, c, x, y) - smooth[c]));
+                    worst_normal = fmax(worst_normal, fabs(bend_get(&t, SMOOTH, c, x, y) - smooth[c]));
             }
         }
         print_message("%dx%d, %d of %d bent: largest relative error (well spread) %.2g, of the normal %.2g "
@@ -249,7 +60,7 @@ static void agrees_with_twin(void **state)
         assert_true(worst < 1e-4);
         assert_true(worst_normal < 1e-5);
         assert_true(skipped * 50 <= seen + 50);
-        done(&t);
+        bend_free(&t);
     }
 }
 
@@ -264,31 +75,32 @@ typedef struct shape {
 
 static double depth_of(const shape *s, const double *ray)
 {
-    double r[3], c[3], along_r = dot(ray, s->axis), along_c = dot(s->centre, s->axis);
+    double r[3], c[3], along_r = bend_dot(ray, s->axis), along_c = bend_dot(s->centre, s->axis);
     for (int i = 0; i < 3; i++) {
         r[i] = ray[i] - along_r * s->axis[i];
         c[i] = s->centre[i] - along_c * s->axis[i];
     }
-    double a = dot(r, r), b = dot(r, c), root = b * b - a * (dot(c, c) - s->radius * s->radius);
+    double a = bend_dot(r, r), b = bend_dot(r, c),
+           root = b * b - a * (bend_dot(c, c) - s->radius * s->radius);
     return root <= 0 ? 0 : s->hollow ? (b + sqrt(root)) / a : (b - sqrt(root)) / a;
 }
 
 static void normal_of(const shape *s, const double *p, double *n)
 {
-    double along = dot(p, s->axis) - dot(s->centre, s->axis);
+    double along = bend_dot(p, s->axis) - bend_dot(s->centre, s->axis);
     for (int i = 0; i < 3; i++)
         n[i] = (p[i] - s->centre[i] - along * s->axis[i]) * (s->hollow ? -1 : 1);
-    normalize(n);
+    bend_normalize(n);
 }
 
 /* Draws a shape over what is there, if nearer; `bits` > 0 rounds normals to so many bits, as half files do
  * with 11. */
-static void draw(fixture *t, const shape *s, uint32_t id, int bits)
+static void draw(bend_scene *t, const shape *s, uint32_t id, int bits)
 {
     const frame_t *f = &t->run.frame;
     for (int y = f->valid[1]; y < f->valid[3]; y++) {
         for (int x = f->valid[0]; x < f->valid[2]; x++) {
-            double view[3], ray[3], n[3], there = id_at(t, x, y) ? get(t, DEPTH, 0, x, y) : 1e30;
+            double view[3], ray[3], n[3], there = bend_id(t, x, y) ? bend_get(t, DEPTH, 0, x, y) : 1e30;
             twin_ray(f, &f->camera, x, y, view, ray);
             double z = depth_of(s, ray);
             if (z <= 0 || z >= there)
@@ -308,7 +120,7 @@ static void draw(fixture *t, const shape *s, uint32_t id, int bits)
     }
 }
 
-static void clear(fixture *t)
+static void clear(bend_scene *t)
 {
     const frame_t *f = &t->run.frame;
     for (int y = 0; y < f->rows; y++)
@@ -317,7 +129,7 @@ static void clear(fixture *t)
 }
 
 /* A point `z` metres away along the ray of a pixel. */
-static void through_pixel(const fixture *t, double x, double y, double z, double *p)
+static void through_pixel(const bend_scene *t, double x, double y, double z, double *p)
 {
     double view[3];
     twin_ray(&t->run.frame, &t->run.frame.camera, x, y, view, p);
@@ -325,27 +137,27 @@ static void through_pixel(const fixture *t, double x, double y, double z, double
         p[i] *= z;
 }
 
-static double seen_angle(const fixture *t, int x, int y)
+static double seen_angle(const bend_scene *t, int x, int y)
 {
     double n[3], p[3];
-    normal_at(t, x, y, n);
-    position(t, x, y, p);
-    return -dot(n, p) / sqrt(dot(p, p));
+    bend_normal(t, x, y, n);
+    bend_position(t, x, y, p);
+    return -bend_dot(n, p) / sqrt(bend_dot(p, p));
 }
 
 /* Largest relative error of the curvature over the pixels of `id` that face the camera by at least `facing`.
  */
-static double error_of(const fixture *t, uint32_t id, double want, double facing, int *seen)
+static double error_of(const bend_scene *t, uint32_t id, double want, double facing, int *seen)
 {
     const frame_t *f = &t->run.frame;
     double worst = 0;
     *seen = 0;
     for (int y = f->valid[1]; y < f->valid[3]; y++) {
         for (int x = f->valid[0]; x < f->valid[2]; x++) {
-            double got = get(t, CURVATURE, 0, x, y);
-            if (!id_at(t, x, y))
+            double got = bend_get(t, CURVATURE, 0, x, y);
+            if (!bend_id(t, x, y))
                 assert_true(got == 0);
-            if (id_at(t, x, y) != id || seen_angle(t, x, y) < facing)
+            if (bend_id(t, x, y) != id || seen_angle(t, x, y) < facing)
                 continue;
             assert_true(isfinite(got));
             worst = fmax(worst, fabs(got - want) / fmax(fabs(want), 1e-9));
@@ -358,10 +170,10 @@ static double error_of(const fixture *t, uint32_t id, double want, double facing
 static void balls_and_cylinders_have_theirs(void **state)
 {
     static const double radii[] = {0.004, 0.02, 0.15};
-    fixture t;
+    bend_scene t;
     int seen;
     (void)state;
-    make(&t, 200, 120, 0, 0, 3);
+    bend_make(&t, 200, 120, 0, 0, 3);
     for (int kind = 0; kind < 6; kind++) {
         for (int i = 0; i < 3; i++) {
             shape s = {.radius = radii[i], .hollow = kind & 1};
@@ -383,17 +195,17 @@ static void balls_and_cylinders_have_theirs(void **state)
             assert_true(worst < 5e-3); /* the ridge's weight, on cylinders seen along their axis */
         }
     }
-    done(&t);
+    bend_free(&t);
 }
 
 /* One pixel wide: only the curvature along the strip can be known, and that is a ball's everywhere. */
 static void a_strip_has_what_it_can_show(void **state)
 {
-    fixture t;
+    bend_scene t;
     int seen;
     shape s = {.radius = 0.02};
     (void)state;
-    make(&t, 200, 120, 0, 0, 3);
+    bend_make(&t, 200, 120, 0, 0, 3);
     through_pixel(&t, 100, 60, 0.2, s.centre);
     clear(&t);
     draw(&t, &s, 2, 0);
@@ -405,20 +217,20 @@ static void a_strip_has_what_it_can_show(void **state)
     assert_true(shade_execute(&t.run));
     assert_true(error_of(&t, 2, 50, 0.05, &seen) < 2e-3);
     assert_true(seen > 20);
-    done(&t);
+    bend_free(&t);
 }
 
 static void planes_have_none(void **state)
 {
-    fixture t;
+    bend_scene t;
     int seen;
     shape far = {.radius = 1e7}; /* as flat as float can tell */
     (void)state;
-    make(&t, 200, 120, 0, 0, 3);
+    bend_make(&t, 200, 120, 0, 0, 3);
     through_pixel(&t, 100, 60, 1e7 + 0.5, far.centre);
     far.centre[0] += 2e6;
     far.centre[1] -= 3e6;
-    far.radius = sqrt(dot(far.centre, far.centre)) - 0.5;
+    far.radius = sqrt(bend_dot(far.centre, far.centre)) - 0.5;
     clear(&t);
     draw(&t, &far, 1, 0);
     assert_true(shade_execute(&t.run));
@@ -426,7 +238,7 @@ static void planes_have_none(void **state)
     print_message("plane: largest curvature %.1g 1/m\n", worst);
     assert_int_equal(seen, 200 * 120);
     assert_true(worst < 0.01);
-    done(&t);
+    bend_free(&t);
 }
 
 /* In front of a large ball floats a small one, of the same material or of another: neither sees the other's.
@@ -435,10 +247,10 @@ static void borders_do_not_leak(void **state)
 {
     (void)state;
     for (uint32_t other = 2; other <= 3; other++) {
-        fixture t;
+        bend_scene t;
         int seen[2];
         shape large = {.radius = 0.2}, small = {.radius = 0.02};
-        make(&t, 200, 120, 0, 0, 3);
+        bend_make(&t, 200, 120, 0, 0, 3);
         through_pixel(&t, 100, 60, 0.9, large.centre);
         through_pixel(&t, 110, 55, 0.55, small.centre);
         clear(&t);
@@ -453,15 +265,15 @@ static void borders_do_not_leak(void **state)
         seen[0] = seen[1] = 0;
         for (int y = f->valid[1]; y < f->valid[3]; y++) {
             for (int x = f->valid[0]; x < f->valid[2]; x++) {
-                if (!id_at(&t, x, y) || seen_angle(&t, x, y) < 0.15)
+                if (!bend_id(&t, x, y) || seen_angle(&t, x, y) < 0.15)
                     continue;
                 double p[3], from[3];
-                position(&t, x, y, p);
+                bend_position(&t, x, y, p);
                 for (int i = 0; i < 3; i++)
                     from[i] = p[i] - small.centre[i];
-                int is_small = fabs(sqrt(dot(from, from)) - small.radius) < 1e-4;
+                int is_small = fabs(sqrt(bend_dot(from, from)) - small.radius) < 1e-4;
                 double want = is_small ? 50 : 5;
-                worst = fmax(worst, fabs(get(&t, CURVATURE, 0, x, y) / want - 1));
+                worst = fmax(worst, fabs(bend_get(&t, CURVATURE, 0, x, y) / want - 1));
                 seen[is_small]++;
             }
         }
@@ -469,18 +281,18 @@ static void borders_do_not_leak(void **state)
                       other == 2 ? "one material" : "two materials", worst, seen[0], seen[1]);
         assert_true(seen[0] > 1000 && seen[1] > 300);
         assert_true(worst < 2e-3);
-        done(&t);
+        bend_free(&t);
     }
 }
 
 /* Normals from a half file have 11 bits: what that does to the curvature, and how the window helps. */
 static void half_normals_cost_little(void **state)
 {
-    fixture t;
+    bend_scene t;
     int seen;
     shape s = {.radius = 0.1};
     (void)state;
-    make(&t, 200, 120, 0, 0, 3);
+    bend_make(&t, 200, 120, 0, 0, 3);
     through_pixel(&t, 100, 60, 0.3, s.centre);
     clear(&t);
     draw(&t, &s, 2, 11);
@@ -493,19 +305,19 @@ static void half_normals_cost_little(void **state)
         if (i)
             assert_true(worst < 0.03);
     }
-    done(&t);
+    bend_free(&t);
 }
 
 /* Bumps as small as the window go, the ball's own normal stays. */
 static void smooth_normal_loses_bumps(void **state)
 {
-    fixture t;
+    bend_scene t;
     uint64_t seed = 5;
     double before = 0, after = 0;
     int seen = 0;
     shape s = {.radius = 0.1};
     (void)state;
-    make(&t, 200, 120, 0, 0, 3);
+    bend_make(&t, 200, 120, 0, 0, 3);
     const frame_t *f = &t.run.frame;
     through_pixel(&t, 100, 60, 0.3, s.centre);
     clear(&t);
@@ -513,10 +325,10 @@ static void smooth_normal_loses_bumps(void **state)
     for (int y = 0; y < 120; y++) {
         for (int x = 0; x < 200; x++) {
             double n[3];
-            normal_at(&t, x, y, n);
+            bend_normal(&t, x, y, n);
             for (int i = 0; i < 3; i++)
                 n[i] += 0.2 * (shade_random(&seed) - 0.5);
-            normalize(n);
+            bend_normalize(n);
             for (int i = 0; i < 3; i++)
                 *shade_at(t.run.images[NORMAL], f, i, x, y) = (float)n[i];
         }
@@ -526,15 +338,15 @@ static void smooth_normal_loses_bumps(void **state)
         for (int x = 0; x < 200; x++) {
             double p[3], n[3], view[3], ray[3];
             twin_ray(f, &f->camera, x, y, view, ray);
-            if (!id_at(&t, x, y))
+            if (!bend_id(&t, x, y))
                 continue;
-            position(&t, x, y, p);
+            bend_position(&t, x, y, p);
             normal_of(&s, p, n);
-            if (-dot(n, p) / sqrt(dot(p, p)) < 0.5)
+            if (-bend_dot(n, p) / sqrt(bend_dot(p, p)) < 0.5)
                 continue;
             for (int i = 0; i < 3; i++) {
-                before += pow(get(&t, NORMAL, i, x, y) - n[i], 2);
-                after += pow(get(&t, SMOOTH, i, x, y) - n[i], 2);
+                before += pow(bend_get(&t, NORMAL, i, x, y) - n[i], 2);
+                after += pow(bend_get(&t, SMOOTH, i, x, y) - n[i], 2);
             }
             seen++;
         }
@@ -542,7 +354,7 @@ static void smooth_normal_loses_bumps(void **state)
     print_message("bumps: %.3f before, %.3f after (rms)\n", sqrt(before / seen), sqrt(after / seen));
     assert_true(seen > 1000);
     assert_true(after < before / 10); /* 17 normals: 1/17 */
-    done(&t);
+    bend_free(&t);
 }
 
 int main(void)

@@ -95,7 +95,7 @@ static const row rows[] = {
     {"missing files", "monkey.####.exr", "gone.####.exr", true, .says = {"gone."}},
     {"missing channel", "normal.X, normal.Y", "nrm.X, normal.Y", true, .says = {"monkey.0001.exr", "layer 'normal'", "'nrm.X'", "normal.X"}},
     {"missing required layer", "  depth:     {channels: [depth.Z], kind: planar, empty: 1e10}\n", "", true, .says = {"depth"}},
-    {"a material for a name that the capture lacks", "  default: {}", "  default: {}\n  jade: {}", .at = "jade", .says = {"jade"}},
+    {"a material for a name that the capture lacks", "  default: {}", "  default: {}\n  marbel: {}", .at = "marbel", .says = {"marbel"}},
     {"a stencil id without a material", "  default: {}\n", "", .says = {"id 2", "pixels"}, .status = 1},
     {"more memory than allowed", .arguments = {"--memory-limit", "1M"}, .says = {"memory"}},
     {"a crop outside of the image", .arguments = {"--crop", "5000,0,10,10"}, .says = {"--crop 5000"}, .status = 1},

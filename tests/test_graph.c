@@ -117,7 +117,7 @@ static void expect_error(fixture *f, const rl_node *nodes, size_t n, int line, c
 }
 
 static const rl_node standard[] = {
-    {"light",                       AT(1), &light, NULL,                            NULL,   0},
+    {"light",                       AT(1), &light, NULL,                            NULL,   0, NULL},
     {"sss",                             AT(2),                              &sss,   NULL, INPUTS({"diffuse", "light.diffuse", AT(3)}, {"lit", "light.lit", AT(4)})},
     {"aa", AT(5),      &taa,         NULL,                                   INPUTS({"color", "sss.color", AT(6)})                               },
 };
@@ -237,15 +237,15 @@ static void refuses_what_does_not_fit(void **state)
     const rl_node twice = {"aa", AT(2), &taa, NULL,
                            INPUTS({"color", "capture.albedo", AT(3)}, {"color", "capture.albedo", AT(4)})};
     expect_error(f, &twice, 1, 4, "pass 'aa' (taa): input 'color' is given twice");
-    const rl_node many = {"lamps", AT(2), &lamps, NULL, NULL, 0};
+    const rl_node many = {"lamps", AT(2), &lamps, NULL, NULL, 0, NULL};
     expect_error(
         f, &many, 1, 2,
         "pass 'lamps' (lamps): port 'out' cannot be of type lights: only the capture has a plane a light");
     const rl_node same[] = {
-        standard[0], {"light", AT(9), &light, NULL, NULL, 0}
+        standard[0], {"light", AT(9), &light, NULL, NULL, 0, NULL}
     };
     expect_error(f, same, 2, 9, "two passes are named 'light'");
-    const rl_node capture = {"capture", AT(8), &light, NULL, NULL, 0};
+    const rl_node capture = {"capture", AT(8), &light, NULL, NULL, 0, NULL};
     expect_error(f, &capture, 1, 8,
                  "a pass cannot be named 'capture': that is the name of the capture's layers");
     const rl_node lazy = {"i", AT(8), &idle, NULL, INPUTS({"from", "capture.albedo", AT(3)})};
@@ -332,7 +332,7 @@ static void takes_long_chains(void **state)
     for (int i = 0; i < N; i++) {
         inputs[i] = (rl_node_input){
             "from", i + 1 < N ? rl_arena_printf(&f->arena, "n%d.to", i + 1) : "capture.albedo", RL_NOWHERE};
-        nodes[i] = (rl_node){rl_arena_printf(&f->arena, "n%d", i), RL_NOWHERE, &view, NULL, &inputs[i], 1};
+        nodes[i] = (rl_node){rl_arena_printf(&f->arena, "n%d", i), RL_NOWHERE, &view, NULL, &inputs[i], 1, NULL};
     }
     assert_int_equal(build(f, nodes, N, NULL, 0), RL_OK);
     inputs[N - 1].image = "n0.to";

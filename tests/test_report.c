@@ -199,7 +199,8 @@ static void test_summary_names_failures(void **state)
     rl_report_run_end(&s->r, &summary, false);
     assert_string_equal(screen_text(s),
                         "shot frame 12: error: id 7 has no material\n"
-                        "1 of 2 frames failed: shot 12\n"
+                        "1 of 2 frames failed:\n"
+                        "  shot frame 12: id 7 has no material\n"
                         "warning: 5 samples of the capture were NaN or infinite; they became 0\n");
     screen_close(s);
 }

@@ -90,6 +90,10 @@ static void curvature_must_be_there(void **state)
            "`in:` or give the capture a layer 'curvature'");
     expect(run_with(folder, "", "shading.diffuse=lambert"), 0, "");
     expect(run_with(folder, "", "materials.skin.profile=null"), 0, ""); /* nothing scatters */
+    expect(run_with(folder, "", "profiles.skin.scatter_distance_mm=null"), 2,
+           "the profile of material 'skin' needs 'sg_variance_mm2' or 'scatter_distance_mm', since it has "
+           "'diffuse: sg'");
+    expect(run_with(folder, "", "profiles.skin={sg_variance_mm2: [9, 3, 1]}"), 0, "");
     folder_remove(folder);
 }
 

@@ -25,15 +25,15 @@ static const struct {
 static void burley_equals_twin(void **state)
 {
     (void)state;
-    for (int variant = 0; variant < 4; variant++)
+    for (int variant = 0; variant < 6; variant++)
         for (size_t k = 0; k < sizeof windows / sizeof *windows; k++) {
             static const int taps[] = {1, 21, 55, 130};
             sss_scene s = sss_scene_make(windows[k].x, windows[k].y, windows[k].width, windows[k].height,
                                          windows[k].focal);
             s.twin.frame.camera.focal[1] *= 1.3f;
             s.twin.frame.camera.jitter[0] = 0.3f;
-            int weighting = variant & 1;
-            s.twin.tangent = variant >> 1;
+            int weighting = variant % 3;
+            s.twin.tangent = variant / 3;
             sss_scene_random(&s, (uint32_t)k + 1);
             for (size_t t = 0; t < 4; t++) {
                 s.twin.rotation = (int)(t + k) % 4;
@@ -61,13 +61,13 @@ static void burley_equals_twin_4096(void **state)
 static void reference_equals_twin(void **state)
 {
     (void)state;
-    for (int variant = 0; variant < 4; variant++)
+    for (int variant = 0; variant < 6; variant++)
         for (size_t k = 0; k < sizeof windows / sizeof *windows; k++) {
             sss_scene s = sss_scene_make(windows[k].x, windows[k].y, windows[k].width, windows[k].height,
                                          windows[k].focal);
             s.twin.frame.camera.focal[1] *= 1.3f;
-            int weighting = variant & 1;
-            s.twin.tangent = variant >> 1;
+            int weighting = variant % 3;
+            s.twin.tangent = variant / 3;
             sss_scene_random(&s, (uint32_t)k + 31);
             sss_run_reference(&s, weighting);
             double worst = sss_worst(&s, 0, weighting, 13);
@@ -106,10 +106,10 @@ static double median_of(double *v, size_t n, double share)
 static void burley_tends_to_reference(void **state)
 {
     (void)state;
-    for (int variant = 0; variant < 4; variant++) {
+    for (int variant = 0; variant < 6; variant++) {
         sss_scene s = sss_scene_make(10, 6, 128, 72, 500);
-        int weighting = variant & 1;
-        s.twin.tangent = variant >> 1;
+        int weighting = variant % 3;
+        s.twin.tangent = variant / 3;
         double differences[3 * 18 * 10];
         size_t n = 0;
         sss_scene_flat(&s, 1, 0.7f, 1);

@@ -24,7 +24,7 @@ void tool_result_free(tool_result *r);
 /* A fresh folder under $TMPDIR; removed with all that is in it by folder_remove. The result is malloc'ed. */
 char *folder_new(void);
 void folder_remove(char *folder);
-/* Regular files below a folder; 0 when there is no such folder. */
+/* Regular files below a folder, without relit's own notes (.relit/); 0 when there is no such folder. */
 int folder_files(const char *folder);
 
 /* "folder/name", malloc'ed. */

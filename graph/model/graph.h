@@ -74,8 +74,8 @@ rl_code rl_graph_build(rl_arena *arena, const rl_node *nodes, size_t n_nodes, co
                        size_t n_layers, const rl_wanted *wanted, size_t n_wanted, const rl_graph **out,
                        rl_error *err);
 
-/* Fails where a material needs an optional port (rl_port.needed_by) that is absent: the error names pass, port, material and
- * layer. */
+/* Fails where a material needs an optional port (rl_port.needed_by) or a key of its profile (rl_param.needed_by) that is absent: the
+ * error names pass, material, and port and layer, or key. */
 rl_code rl_graph_check_needs(rl_arena *arena, const rl_graph *graph, const rl_materials *materials, rl_error *err);
 
 /* The image of that name, "aa.color" or "capture.depth", or -1. */

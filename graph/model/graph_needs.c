@@ -1,7 +1,14 @@
-/* Ports that a material makes necessary. */
+/* Ports and profile keys that a material's shading makes necessary. */
 #include <string.h>
 
 #include "graph/model/graph.h"
+
+typedef struct needs {
+    rl_arena *arena;
+    const rl_materials *materials;
+    const rl_graph_node *node;
+    rl_error *err;
+} needs;
 
 /* Index of `word` in "a|b|c", or -1. */
 static int word_index(const char *words, const char *word)
@@ -16,59 +23,84 @@ static int word_index(const char *words, const char *word)
     return -1;
 }
 
-/* "key: word" as the shading row and the value that it asks for; false when the pass has no such row. */
-static bool find_need(rl_arena *arena, const rl_pass *pass, const char *need, const char **key, int *value)
+/* "key: word" as the pass's shading row and the value that it asks for. */
+static rl_code find_need(const needs *n, const char *name, const char *need, const char **key, int *value)
 {
-    char *text = rl_arena_strdup(arena, need), *colon = text ? strstr(text, ": ") : NULL;
-    if (!colon)
-        return false;
-    *colon = 0;
+    const rl_params rows = n->node->pass->shading_keys;
+    char *text = rl_arena_strdup(n->arena, need), *colon = text ? strstr(text, ": ") : NULL;
+    if (!text)
+        return rl_fail_memory(n->err, strlen(need));
+    *value = -1;
+    if (colon)
+        *colon = 0;
+    for (size_t i = 0; colon && i < rows.n; i++)
+        if (!strcmp(rows.rows[i].name, text))
+            *value = word_index(rows.rows[i].words, colon + 2);
     *key = text;
-    for (size_t i = 0; i < pass->shading_keys.n; i++) {
-        const rl_param *row = &pass->shading_keys.rows[i];
-        if (!strcmp(row->name, text)) {
-            *value = word_index(row->words, colon + 2);
-            return *value >= 0;
-        }
-    }
-    return false;
+    return *value >= 0 ? RL_OK
+                       : rl_fail(n->err, RL_E_INTERNAL, n->node->where,
+                                 "pass %s: '%s' is needed by '%s', which is no shading word of it",
+                                 n->node->pass->name, name, need);
 }
 
-/* Index of the first material that asks for it, 0 = none. */
-static size_t who_needs(const rl_materials *m, const char *key, int value)
+static bool asks(const rl_materials *m, size_t material, const char *key, int value)
 {
-    for (size_t i = 1; i < m->count; i++) {
-        double v[3] = {-1};
-        if (rl_material_has_profile(m, i) && rl_material_get(m, i, "shading", key, v) && (int)v[0] == value)
-            return i;
-    }
-    return 0;
+    double v[3] = {-1};
+    return rl_material_has_profile(m, material) && rl_material_get(m, material, "shading", key, v) &&
+           (int)v[0] == value;
+}
+
+static rl_code check_port(const needs *n, const rl_port *port)
+{
+    const char *key;
+    int value;
+    rl_code code = find_need(n, port->name, port->needed_by, &key, &value);
+    for (size_t i = 1; i < n->materials->count && !code; i++)
+        if (asks(n->materials, i, key, value))
+            code = rl_fail(n->err, RL_E_CONFIG, n->node->where,
+                           "pass '%s' (%s): port '%s' needs an image (%s), since material '%s' has '%s': "
+                           "name one in `in:` or give the "
+                           "capture a layer '%s'",
+                           n->node->name, n->node->pass->name, port->name, rl_format_name(port->format),
+                           n->materials->names[i], port->needed_by, port->name);
+    return code;
+}
+
+static bool gives(const rl_materials *m, size_t material, const char *key)
+{
+    double v[3] = {-1};
+    return key && rl_material_get(m, material, "profile", key, v) && v[0] >= 0;
+}
+
+static rl_code check_row(const needs *n, const rl_param *row)
+{
+    const char *key;
+    int value;
+    rl_code code = find_need(n, row->name, row->needed_by, &key, &value);
+    for (size_t i = 1; i < n->materials->count && !code; i++)
+        if (asks(n->materials, i, key, value) && !gives(n->materials, i, row->name) &&
+            !gives(n->materials, i, row->instead))
+            code = rl_fail(n->err, RL_E_CONFIG, n->node->where,
+                           "pass '%s' (%s): the profile of material '%s' needs '%s'%s%s%s, since it has '%s'",
+                           n->node->name, n->node->pass->name, n->materials->names[i], row->name,
+                           row->instead ? " or '" : "", row->instead ? row->instead : "",
+                           row->instead ? "'" : "", row->needed_by);
+    return code;
 }
 
 rl_code rl_graph_check_needs(rl_arena *arena, const rl_graph *graph, const rl_materials *materials,
                              rl_error *err)
 {
-    for (size_t n = 0; n < graph->n_nodes; n++) {
-        const rl_graph_node *node = &graph->nodes[n];
-        for (size_t p = 0; p < node->pass->ports.n; p++) {
-            const rl_port *port = &node->pass->ports.rows[p];
-            const char *key = NULL;
-            int value = -1;
-            if (!port->needed_by || node->images[p] >= 0)
-                continue;
-            if (!find_need(arena, node->pass, port->needed_by, &key, &value))
-                return rl_fail(err, RL_E_INTERNAL, node->where,
-                               "pass %s: port '%s' is needed by '%s', which is no word of a shading key",
-                               node->pass->name, port->name, port->needed_by);
-            size_t material = who_needs(materials, key, value);
-            if (material)
-                return rl_fail(err, RL_E_CONFIG, node->where,
-                               "pass '%s' (%s): port '%s' needs an image (%s), since material '%s' has '%s': "
-                               "name one in `in:` or "
-                               "give the capture a layer '%s'",
-                               node->name, node->pass->name, port->name, rl_format_name(port->format),
-                               materials->names[material], port->needed_by, port->name);
-        }
+    rl_code code = RL_OK;
+    for (size_t i = 0; i < graph->n_nodes && !code; i++) {
+        const needs n = {arena, materials, &graph->nodes[i], err};
+        const rl_pass *pass = n.node->pass;
+        for (size_t p = 0; p < pass->ports.n && !code; p++)
+            if (pass->ports.rows[p].needed_by && n.node->images[p] < 0)
+                code = check_port(&n, &pass->ports.rows[p]);
+        for (size_t k = 0; k < pass->profile_keys.n && !code; k++)
+            if (pass->profile_keys.rows[k].needed_by)
+                code = check_row(&n, &pass->profile_keys.rows[k]);
     }
-    return RL_OK;
+    return code;
 }

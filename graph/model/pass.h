@@ -64,6 +64,9 @@ typedef struct rl_param {
                             declares it so; rows of a list: every element must */
     bool no_default;     /* rows of the material table with min >= 0: the device sees -1 where it is not given */
     const char *required_with; /* profile rows, "KEY=a|b": required of profiles whose KEY is one of the words */
+    const char *needed_by; /* profile rows with no_default, "diffuse: sg": required of the profiles of materials with that
+                              shading word (graph.h), */
+    const char *instead;   /* unless the profile gives this other row; or NULL */
     rl_params list;      /* RL_ROWS: the keys of an element, none of them RL_ROWS */
     double most_sum;     /* float rows of a list, > 0: what the elements add up to at most, each channel (+1e-6) */
 } rl_param;
@@ -189,6 +192,10 @@ typedef struct rl_pass {
     /* Computes constant tables from parameters and materials, in double, into `arena`; NULL = none. Pure. */
     rl_code (*tables)(const rl_pass_input *in, rl_arena *arena, rl_tables *out, rl_error *err);
     const void *data; /* for .tables of a pass that is built at run time; the engine does not look at it */
+    /* Passes with HISTORY ports: the least share that a frame has in its own result, so that the share of what is k
+     * frames old is at most (1 - it)^k; NULL = not known. `fades_where`: where that holds, and what holds elsewhere. */
+    double (*least_share)(const void *params);
+    const char *fades_where;
 } rl_pass;
 
 /* The struct holds the table's 4-byte fields and nothing else; RGB rows count three. */

@@ -33,7 +33,6 @@ struct rl_device {
     } spans[MOST_SPANS];
     size_t n_spans;
     int64_t clock_offset; /* device time + offset = CLOCK_MONOTONIC, ns */
-    bool clock_known;
 };
 
 struct rl_memory {
@@ -580,16 +579,15 @@ static rl_code get_kernel(rl_program *p, const char *entry, cl_kernel *out, rl_e
 /* ---- running ---------------------------------------------------------------------------------------------
  */
 
-static void read_span(rl_device *d, cl_event event, rl_span *out)
+static void read_span(rl_device *d, cl_event event, bool newest, rl_span *out)
 {
     cl_ulong start = 0, end = 0;
     clGetEventProfilingInfo(event, CL_PROFILING_COMMAND_START, sizeof start, &start, NULL);
     clGetEventProfilingInfo(event, CL_PROFILING_COMMAND_END, sizeof end, &end, NULL);
-    if (!d->clock_known) { /* the first to be read has just ended: close enough to line two clocks up */
+    if (newest) { /* it has just ended: close enough to line two clocks up, every time anew since they drift */
         struct timespec now;
         clock_gettime(CLOCK_MONOTONIC, &now);
         d->clock_offset = (int64_t)now.tv_sec * 1000000000 + now.tv_nsec - (int64_t)end;
-        d->clock_known = true;
     }
     out->start = (uint64_t)((int64_t)start + d->clock_offset);
     out->end = (uint64_t)((int64_t)end + d->clock_offset);
@@ -639,7 +637,7 @@ rl_code rl_device_finish(rl_device *device, rl_error *err)
 {
     cl_int status = waited(clFinish(device->queue));
     for (size_t i = device->n_spans; i-- > 0;) {
-        read_span(device, device->spans[i].event, device->spans[i].out);
+        read_span(device, device->spans[i].event, i == device->n_spans - 1, device->spans[i].out);
         clReleaseEvent(device->spans[i].event);
     }
     device->n_spans = 0;

@@ -4,33 +4,11 @@
 
 #include "graph/base/alloc.h"
 #include "graph/base/pool.h"
+#include "graph/run/executor_parts.h"
 #include "graph/run/kernel_source.h"
 
 /* Kernels address images from pixel (0, 0) on; the guard in front can be read. */
 #define GUARD_BYTES (RL_GUARD * sizeof(float))
-
-/* What a live node needs besides images. */
-typedef struct node_state {
-    rl_program *program;
-    rl_memory *params, *tables; /* NULL when the pass has none */
-} node_state;
-
-struct rl_executor {
-    rl_arena arena;
-    rl_device *device;
-    const rl_plan *plan;
-    const rl_materials *material_table;
-    const rl_log *log;
-    node_state *nodes; /* [graph->n_nodes] */
-    rl_program *convert;
-    rl_memory *materials, *frame, *lights, *ambient;
-    rl_geometry geometry; /* columns 0: no size yet */
-    rl_memory **slots;    /* [plan->n_slots] */
-    rl_memory **history;  /* [plan->n_buffers][2]; NULL where the buffer is not HISTORY */
-    int newest;           /* which half of the pairs this frame writes */
-    bool has_history;
-    camera_t previous;
-};
 
 struct rl_frame_buffers {
     rl_geometry geometry;
@@ -61,7 +39,7 @@ static rl_code upload(rl_executor *x, const void *data, size_t bytes, rl_memory 
 static rl_code make_constants(rl_executor *x, int node, rl_error *err)
 {
     const rl_graph_node *g = &x->plan->graph->nodes[node];
-    node_state *n = &x->nodes[node];
+    rl_node_state *n = &x->nodes[node];
     rl_code code = RL_OK;
     if (g->pass->params.n > 0)
         code = upload(x, g->params, g->pass->params_size, &n->params, err);
@@ -302,7 +280,7 @@ static rl_code run_kernel(rl_executor *x, const rl_plan_step *s, const rl_frame_
                           rl_error *err)
 {
     const rl_graph_node *g = &x->plan->graph->nodes[s->node];
-    const node_state *n = &x->nodes[s->node];
+    const rl_node_state *n = &x->nodes[s->node];
     const rl_pass *pass = g->pass;
     const rl_step *step = &pass->steps.rows[s->step];
     rl_memory *args[MOST_ARGUMENTS];

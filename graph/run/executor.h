@@ -54,6 +54,20 @@ rl_code rl_executor_run(rl_executor *executor, rl_frame_buffers *buffers, const 
 /* Forgets history: a cut. */
 void rl_executor_cut(rl_executor *executor);
 
+/* ---- history as bytes: a checkpoint (executor_history.c) ---- */
+
+/* What the next frame would see of the past: the valid half of every pair, one after the other in the order of the
+ * plan's buffers. 0 when the plan keeps no history or no frame has run. */
+size_t rl_executor_history_bytes(const rl_executor *executor);
+bool rl_executor_has_history(const rl_executor *executor);
+/* Copies it out (rl_executor_history_bytes bytes), with the camera of the frame that it is of. RL_E_INTERNAL when
+ * there is none. */
+rl_code rl_executor_history_save(rl_executor *executor, void *out, camera_t *previous, rl_error *err);
+/* Puts it back, bit for bit, for frames of that size: the next run goes on as if the frame had just run here.
+ * RL_E_DATA when `bytes` is not what such history takes. */
+rl_code rl_executor_history_load(rl_executor *executor, const rl_geometry *geometry, const void *in, size_t bytes,
+                                 const camera_t *previous, rl_error *err);
+
 #ifdef __cplusplus
 }
 #endif

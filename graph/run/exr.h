@@ -115,6 +115,9 @@ typedef struct rl_exr_rows {
 rl_code rl_exr_read(const rl_exr *file, int part, rl_exr_plane *planes, size_t n_planes,
                     const rl_exr_rows *rows, rl_pool *pool, rl_error *err);
 
+/* The most that rl_exr_read allocates for a part with a pool of so many threads; 0 when the header is broken. */
+uint64_t rl_exr_read_scratch(const rl_exr *file, int part, int threads);
+
 /* ---- attributes ---- */
 
 typedef enum rl_exr_type {

@@ -17,6 +17,7 @@
 static _Thread_local char said[512];
 /* Where a read ran into the end of the file; that is no error while the core looks ahead. */
 static _Thread_local char short_read[128];
+static _Thread_local bool starved; /* the core asked for memory and got none */
 
 static void keep_message(exr_const_context_t ctx, exr_result_t code, const char *message)
 {
@@ -33,13 +34,21 @@ static void keep_message(exr_const_context_t ctx, exr_result_t code, const char 
 void rl_exr_core_listen(void)
 {
     said[0] = short_read[0] = 0;
+    starved = false;
+}
+
+static void *core_alloc(size_t bytes)
+{
+    void *p = rl_malloc(bytes);
+    starved |= !p;
+    return p;
 }
 
 exr_context_initializer_t rl_exr_core_init(void)
 {
     exr_context_initializer_t init = EXR_DEFAULT_CONTEXT_INITIALIZER;
     init.error_handler_fn = keep_message;
-    init.alloc_fn = rl_malloc;
+    init.alloc_fn = core_alloc;
     init.free_fn = rl_free;
     /* A table of chunks with holes is a file whose writer died: refuse it, rather than guess where chunks
      * are. */
@@ -113,6 +122,9 @@ static rl_code open_file(rl_exr *file, rl_error *err)
     init.size_fn = query_size;
     rl_exr_core_listen();
     exr_result_t rv = exr_start_read(&file->ctx, file->path, &init);
+    /* The core reads on when there is no memory for an attribute, and takes its default: another display window. */
+    if (!rv && starved)
+        rv = EXR_ERR_OUT_OF_MEMORY;
     if (rv)
         return rl_exr_core_fail(err, file->path, rv, "the header is broken");
     return RL_OK;

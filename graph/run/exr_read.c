@@ -257,6 +257,17 @@ static rl_code bind(job *j, rl_error *err)
     return RL_OK;
 }
 
+uint64_t rl_exr_read_scratch(const rl_exr *file, int part, int threads)
+{
+    const rl_exr_part *info = &file->parts[part];
+    uint64_t chunk_bytes = 0;
+    rl_exr_core_listen();
+    if (info->deep || exr_get_chunk_unpacked_size(file->ctx, part, &chunk_bytes))
+        return 0;
+    /* packed, unpacked and scratch of each worker, and a row */
+    return (3 * chunk_bytes + 4 * (uint64_t)info->width) * (uint64_t)threads;
+}
+
 /* Cuts the part into bands and checks what decoding will take against the file's limit. */
 static rl_code divide(job *j, int threads, int *slots, rl_error *err)
 {

@@ -66,6 +66,10 @@ void rl_reader_free(rl_reader **reader);
 /* Opens the files of frame `file_number` and reads headers: fills windows, geometry and camera, no pixel. */
 rl_code rl_reader_open(rl_reader *reader, int file_number, rl_frame *frame, rl_error *err);
 
+/* The files that a frame is read from, in the order of the manifest's patterns; paths in the arena. */
+rl_code rl_reader_paths(const rl_reader *reader, int file_number, rl_arena *arena, const char *paths[RL_MOST_FILES],
+                        size_t *n, rl_error *err);
+
 /* Errors that say that a frame's files are missing or broken, which --on-missing is about. */
 bool rl_reader_missed(rl_code code);
 

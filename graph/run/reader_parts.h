@@ -42,4 +42,14 @@ void rl_reader_convert(rl_reader *r, rl_frame *f, rl_frame_maps *maps, int bindi
 /* Ids without a material: an error of the frame that names them. */
 rl_code rl_reader_check_ids(const rl_reader *r, const rl_frame *f, const rl_frame_maps *maps, rl_error *err);
 
+/* reader_header.c: the part of the file that holds all channels of a layer. */
+rl_code rl_reader_find_part(const rl_layer *layer, const rl_exr *file, int *out, rl_error *err);
+
+/* reader_pixels.c: what reading from files and from memory share. Map the planes, and make room for the file's ids; convert all
+ * rows of a layer; unmap and give the frame's verdict (`code` is what happened before). */
+rl_code rl_reader_map(rl_reader *r, rl_frame *f, rl_frame_maps *maps, rl_error *err);
+rl_code rl_reader_prepare_ids(rl_reader *r, rl_frame *f, rl_error *err);
+void rl_reader_convert_all(rl_reader *r, rl_frame *f, rl_frame_maps *maps, int binding, rl_pool *pool);
+rl_code rl_reader_finish(rl_reader *r, rl_frame *f, rl_frame_maps *maps, rl_code code, rl_error *err);
+
 #endif

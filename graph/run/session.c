@@ -7,8 +7,6 @@
 #include "graph/base/alloc.h"
 #include "graph/base/file.h"
 
-enum { IN_FLIGHT = 3 }; /* one loads, one runs, one is written */
-
 static rl_code apply_settings(rl_session *s, rl_value **root, rl_error *err)
 {
     rl_code code = RL_OK;
@@ -41,24 +39,6 @@ static rl_code read_pipeline(rl_session *s, rl_error *err)
     return code ? code : rl_pipeline_parse(&s->arena, o->pipeline ? o->pipeline : "pipeline", root, s->log, &s->pipeline, err);
 }
 
-static rl_code check_memory(rl_session *s, rl_error *err)
-{
-    for (size_t i = 0; i < s->n_sequences; i++) {
-        const rl_sequence *q = &s->sequences[i];
-        rl_code code = q->geometry.columns ? rl_plan_fits(q->plan, &q->geometry, err) : RL_OK;
-        if (code)
-            return code;
-        size_t one = q->geometry.columns ? rl_plan_bytes(q->plan, &q->geometry, 1) : 0;
-        char need[32], limit[32];
-        if (s->options.memory_limit && one > s->options.memory_limit)
-            return rl_fail(err, RL_E_MEMORY, q->manifest->where,
-                           "one frame of %d x %d needs %s, more than --memory-limit %s", q->geometry.width,
-                           q->geometry.height, rl_format_bytes(one, need),
-                           rl_format_bytes(s->options.memory_limit, limit));
-    }
-    return RL_OK;
-}
-
 rl_code rl_session_open(const rl_options *options, rl_session **out, rl_error *err)
 {
     rl_error local = {0};
@@ -83,7 +63,9 @@ rl_code rl_session_open(const rl_options *options, rl_session **out, rl_error *e
     if (!code)
         code = rl_session_paths(s, err);
     if (!code)
-        code = check_memory(s, err);
+        code = rl_session_count(s, err);
+    if (!code)
+        code = rl_session_check_memory(s, err);
     if (code)
         rl_session_close(&s);
     *out = s;
@@ -143,14 +125,17 @@ rl_code rl_session_plan(const rl_session *s, size_t capture, rl_plan_format form
         return rl_fail(err, RL_E_USAGE, RL_NOWHERE, "there is no capture %zu", capture);
     const rl_sequence *q = &s->sequences[capture];
     const rl_geometry *g = q->geometry.columns ? &q->geometry : NULL;
+    int in_flight = rl_session_in_flight(s, q);
     rl_str out = {0};
     rl_code code = RL_OK;
     if (format == RL_PLAN_TEXT)
-        rl_plan_print_text(q->plan, g, IN_FLIGHT, &out);
+        rl_plan_print_text(q->plan, g, in_flight, &out);
     else if (format == RL_PLAN_DOT)
-        rl_plan_print_dot(q->plan, g, IN_FLIGHT, &out);
+        rl_plan_print_dot(q->plan, g, in_flight, &out);
     else
-        code = rl_plan_print_json(q->plan, g, IN_FLIGHT, &out, err);
+        code = rl_plan_print_json(q->plan, g, in_flight, &out, err);
+    if (!code && format != RL_PLAN_DOT)
+        code = rl_session_print_need(s, q, format == RL_PLAN_JSON, &out, err);
     if (!code && out.failed)
         code = rl_fail_memory(err, out.length);
     if (code)

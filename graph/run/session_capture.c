@@ -228,8 +228,20 @@ static bool wants_ids(const rl_session *s)
     return false;
 }
 
+/* What reading the files of a frame takes besides its buffers: they are read one after the other. */
+static uint64_t decode_bytes(const rl_frame *f, int threads)
+{
+    uint64_t most = 0;
+    for (int i = 0; i < RL_MOST_FILES; i++)
+        for (int part = 0; f->files[i] && part < rl_exr_parts(f->files[i]); part++) {
+            uint64_t bytes = rl_exr_read_scratch(f->files[i], part, threads);
+            most = bytes > most ? bytes : most;
+        }
+    return most;
+}
+
 /* The size of the first frame that can be opened; when none can, the error of the first. */
-static rl_code measure(rl_sequence *q, rl_error *err)
+static rl_code measure(const rl_session *s, rl_sequence *q, rl_error *err)
 {
     rl_error first = {0};
     for (size_t i = 0; i < q->frames.n; i++) {
@@ -237,6 +249,7 @@ static rl_code measure(rl_sequence *q, rl_error *err)
         rl_error one = {0};
         rl_code code = rl_reader_open(q->reader, f.number, &f, &one);
         q->geometry = f.geometry;
+        q->decode_bytes = code ? 0 : decode_bytes(&f, s->threads);
         rl_frame_free(&f);
         if (!rl_reader_missed(code)) {
             *err = code ? one : *err;
@@ -261,7 +274,7 @@ static rl_code make_reader(rl_session *s, rl_sequence *q, rl_error *err)
                              .limit = s->options.memory_limit,
                              .log = s->log};
     rl_code code = rl_reader_new(&setup, &q->reader, err);
-    return code || q->manifest->n_patterns == 0 ? code : measure(q, err);
+    return code || q->manifest->n_patterns == 0 ? code : measure(s, q, err);
 }
 
 static rl_code open_sequence(rl_session *s, rl_sequence *q, rl_error *err)

@@ -79,6 +79,21 @@ extern "C" void rl_ocio_free(rl_ocio **ocio)
     destroy(ocio);
 }
 
+extern "C" void rl_ocio_fingerprint(const rl_ocio *ocio, char *out, size_t size)
+{
+    const char *id = "";
+    try {
+        id = ocio->config->getCacheID();
+    } catch (...) {
+        try { /* a file that it refers to is missing: the text of the configuration alone */
+            id = ocio->config->getCacheID(OCIO::ConstContextRcPtr());
+        } catch (...) {
+        }
+    }
+    std::strncpy(out, id ? id : "", size - 1);
+    out[size - 1] = 0;
+}
+
 extern "C" rl_code rl_ocio_validate(const rl_ocio *ocio, rl_error *err)
 {
     try {

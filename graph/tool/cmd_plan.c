@@ -1,19 +1,24 @@
 /* `relit plan`: the plan of each capture, as text, graphviz, drawn, or JSON. */
 #include <string.h>
 
+#include "graph/tool/shard.h"
 #include "graph/tool/svg.h"
 #include "graph/tool/tool.h"
 
-static rl_code print_capture(const rl_session *session, size_t capture, rl_plan_word word, rl_str *out,
-                             rl_error *err)
+static rl_code print_capture(const rl_session *session, size_t capture, rl_plan_word word, const rl_options *options,
+                             rl_str *out, rl_error *err)
 {
     static const rl_plan_format formats[] = {RL_PLAN_TEXT, RL_PLAN_DOT, RL_PLAN_DOT, RL_PLAN_JSON};
     char *text = NULL;
     rl_code code = rl_session_plan(session, capture, formats[word], &text, err);
     if (!code && word == RL_WORD_SVG)
         code = rl_svg_from_dot(text, out, err);
+    else if (!code && word == RL_WORD_JSON && options->shard[1])
+        code = rl_shard_json(session, capture, options, text, out, err);
     else if (!code)
         rl_str_add(out, text);
+    if (!code && word == RL_WORD_TEXT && options->shard[1])
+        rl_shard_print(session, capture, options, out);
     if (!code && out->length && out->text[out->length - 1] != '\n')
         rl_str_add(out, "\n");
     rl_text_free(text);
@@ -39,7 +44,7 @@ int rl_cmd_plan(rl_tool *tool, rl_error *err)
     for (size_t i = 0; i < (drawing && n ? 1 : n); i++) {
         if (word == RL_WORD_TEXT && n > 1)
             rl_str_printf(&text, "%scapture '%s'\n", i ? "\n" : "", rl_session_capture_name(session, i));
-        if (print_capture(session, i, word, &text, err))
+        if (print_capture(session, i, word, &tool->args.run, &text, err))
             goto done;
     }
     if (drawing && n > 1)

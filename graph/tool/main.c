@@ -31,6 +31,11 @@ static const command commands[] = {
      rl_cmd_passes},
     {{"devices", RL_CMD_DEVICES, NULL, "list OpenCL devices, and which one a run would take", NULL},
      rl_cmd_devices},
+    {{"bench", RL_CMD_BENCH, "[PIPELINE]", "time every stage of a run",
+      "Runs the frames of the capture over and over (pictures go to a temporary\n"
+      "folder) and prints what each stage takes, throughput and peak memory. Without\n"
+      "PIPELINE: configs/skin.yaml. Shares are of the stages' sum: they overlap.\n"},
+     rl_cmd_bench},
 };
 
 enum { N_COMMANDS = sizeof commands / sizeof *commands };

@@ -13,6 +13,8 @@ typedef enum kind {
     INTEGER, /* int, min … max */
     BYTES,   /* uint64_t */
     REGION,  /* int[4]: x, y, width, height */
+    SHARD,   /* int[2]: "I/N" */
+    SIZE,    /* int[2]: "WxH" */
     WORD     /* int, index into words */
 } kind;
 
@@ -27,26 +29,27 @@ typedef struct option {
 } option;
 
 #define SHARED         (RL_CMD_RUN | RL_CMD_CHECK | RL_CMD_PLAN)
-#define EVERY          (SHARED | RL_CMD_INIT | RL_CMD_INSPECT | RL_CMD_PASSES | RL_CMD_DEVICES)
+#define TIMED          (SHARED | RL_CMD_BENCH)
+#define EVERY          (TIMED | RL_CMD_INIT | RL_CMD_INSPECT | RL_CMD_PASSES | RL_CMD_DEVICES)
 #define AT(field)      .at = offsetof(rl_arguments, field)
 #define LIST_AT(field) AT(run.field), .count = offsetof(rl_arguments, run.n_##field)
 
 /* clang-format off */
 static const option options[] = {
-    {"capture", "PATH", SHARED, LIST, LIST_AT(captures),
+    {"capture", "PATH", TIMED, LIST, LIST_AT(captures),
      .help = "a capture.yaml, a folder that holds one, or an EXR\n"
              "file or pattern; replaces the pipeline's own;\n"
              "may be repeated"},
-    {"frames", "SPEC", SHARED, TEXT, AT(run.frames),
+    {"frames", "SPEC", TIMED, TEXT, AT(run.frames),
      .help = "such as 1-24, 1-24x2, 1,5,9-12 or -10--1;\n"
              "default: all that the capture lists"},
     {"out", "DIR", SHARED, TEXT, AT(run.out),
      .help = "where outputs go (created when missing); default: out"},
-    {"set", "PATH=VALUE", SHARED, SETTING, LIST_AT(settings),
+    {"set", "PATH=VALUE", TIMED, SETTING, LIST_AT(settings),
      .help = "set a value of the pipeline by its dotted path,\n"
              "such as graph.sss.taps=55; null removes it;\n"
              "may be repeated"},
-    {"only", "NAME", SHARED, LIST, LIST_AT(only),
+    {"only", "NAME", TIMED, LIST, LIST_AT(only),
      .help = "make this output and no other; may be repeated"},
     {"dump", "IMAGE", SHARED, LIST, LIST_AT(dump),
      .help = "write this image of the graph as EXR besides;\n"
@@ -57,22 +60,40 @@ static const option options[] = {
      .help = "what to do about an input frame that is missing\n"
              "or broken: error (default), skip it, or hold the\n"
              "frame before it under its number"},
-    {"ocio", "FILE", SHARED, TEXT, AT(run.ocio),
+    {"resume", NULL, SHARED, FLAG, AT(run.resume),
+     .help = "keep the pictures that are there and whole, and go\n"
+             "on from the last checkpoint of their history"},
+    {"shard", "I/N", SHARED, SHARD, AT(run.shard),
+     .help = "the I-th of N parts: whole captures, or frame ranges\n"
+             "that take over history from the part before"},
+    {"preroll", "K", SHARED, INTEGER, AT(run.preroll), .min = 1, .max = 1000000,
+     .help = "a shard begins with K frames of warm-up instead; not\n"
+             "exact: `relit plan --shard` says how far off"},
+    {"checkpoint-frames", "N", RL_CMD_RUN, INTEGER, AT(run.checkpoint_frames), .min = 1, .max = 1000000,
+     .help = "save history every N frames; default: so often that\n"
+             "it takes 2 % of the time"},
+    {"ocio", "FILE", TIMED, TEXT, AT(run.ocio),
      .help = "OpenColorIO config; default: the pipeline's, else\n"
              "$OCIO, else relit's own"},
-    {"threads", "N", SHARED, INTEGER, AT(run.threads), .min = 1, .max = 1024,
+    {"threads", "N", TIMED, INTEGER, AT(run.threads), .min = 1, .max = 1024,
      .help = "how many to use; default: one a processor"},
-    {"device", "N|cpu|gpu", SHARED | RL_CMD_DEVICES, TEXT, AT(run.device),
+    {"device", "N|cpu|gpu", TIMED | RL_CMD_DEVICES, TEXT, AT(run.device),
      .help = "OpenCL device, by number (see `relit devices`) or\n"
              "kind; default: a CPU device if there is one"},
-    {"memory-limit", "SIZE", SHARED, BYTES, AT(run.memory_limit),
+    {"memory-limit", "SIZE", TIMED, BYTES, AT(run.memory_limit),
      .help = "most that relit may allocate, such as 512M or 4G;\n"
              "default: no limit"},
     {"format", "WORD", RL_CMD_PLAN, WORD, AT(format), .words = "text|dot|svg|json",
      .help = "text (default), dot, svg or json"},
-    {"json", NULL, SHARED | RL_CMD_PASSES | RL_CMD_DEVICES, FLAG, AT(json),
+    {"json", NULL, TIMED | RL_CMD_PASSES | RL_CMD_DEVICES, FLAG, AT(json),
      .help = "print JSON on stdout (run: an object a frame, each\n"
              "on its line)"},
+    {"size", "WxH", RL_CMD_BENCH, SIZE, AT(size),
+     .help = "time frames of that size: the capture's pixels\n"
+             "repeated or left out; default: as they are"},
+    {"trace", "F.json", RL_CMD_RUN, TEXT, AT(trace),
+     .help = "write what ran when, for ui.perfetto.dev or\n"
+             "chrome://tracing"},
     {"quiet", NULL, EVERY, FLAG, AT(quiet),
      .help = "print errors and warnings only: no notes, no progress"},
     {"verbose", NULL, EVERY, FLAG, AT(verbose),
@@ -147,6 +168,36 @@ static rl_code take_region(const parser *p, const option *o, const char *value, 
     return RL_OK;
 }
 
+static rl_code take_shard(const parser *p, const option *o, const char *value, int out[2])
+{
+    size_t n = strcspn(value, "/");
+    long long part, parts;
+    char *head = rl_arena_strndup(p->arena, value, n);
+    if (!head)
+        return rl_fail_memory(p->err, n);
+    if (value[n] != '/' || !rl_parse_int(head, &part) || !rl_parse_int(value + n + 1, &parts) || parts < 1 ||
+        parts > 1000000 || part < 1 || part > parts)
+        return wrong(p, o, "I/N with I from 1 to N, such as 2/8", value);
+    out[0] = (int)part;
+    out[1] = (int)parts;
+    return RL_OK;
+}
+
+static rl_code take_size(const parser *p, const option *o, const char *value, int out[2])
+{
+    size_t n = strcspn(value, "x");
+    long long width, height;
+    char *head = rl_arena_strndup(p->arena, value, n);
+    if (!head)
+        return rl_fail_memory(p->err, n);
+    if (value[n] != 'x' || !rl_parse_int(head, &width) || !rl_parse_int(value + n + 1, &height) || width < 1 ||
+        height < 1 || width > 65536 || height > 65536)
+        return wrong(p, o, "WxH in pixels, such as 1920x1080", value);
+    out[0] = (int)width;
+    out[1] = (int)height;
+    return RL_OK;
+}
+
 static rl_code take_word(const parser *p, const option *o, const char *value, int *out)
 {
     int index = 0;
@@ -205,6 +256,10 @@ static rl_code take(const parser *p, const option *o, const char *value)
         return RL_OK;
     case REGION:
         return take_region(p, o, value, at);
+    case SIZE:
+        return take_size(p, o, value, at);
+    case SHARD:
+        return take_shard(p, o, value, at);
     default:
         return take_word(p, o, value, at);
     }
@@ -305,6 +360,8 @@ rl_code rl_arguments_parse(rl_arena *arena, const rl_commands *commands, const r
     if (!code && !out->help && !out->operand && command->operand && command->operand[0] != '[')
         code = rl_fail_file(err, RL_E_USAGE, p.place, "needs a %s, see `relit %s --help`", command->operand,
                             command->name);
+    if (!code && out->run.preroll && !out->run.shard[1])
+        code = rl_fail_file(err, RL_E_USAGE, p.place, "--preroll is the warm-up of a shard: give --shard I/N too");
     if (!code && out->quiet && out->verbose)
         code = rl_fail_file(err, RL_E_USAGE, p.place, "--quiet and --verbose exclude each other");
     return code;

@@ -17,7 +17,8 @@ typedef enum rl_command_bit {
     RL_CMD_INIT = 8,
     RL_CMD_INSPECT = 16,
     RL_CMD_PASSES = 32,
-    RL_CMD_DEVICES = 64
+    RL_CMD_DEVICES = 64,
+    RL_CMD_BENCH = 128
 } rl_command_bit;
 
 /* A command as the parser and the help see it. */
@@ -40,6 +41,8 @@ typedef enum rl_plan_word { RL_WORD_TEXT, RL_WORD_DOT, RL_WORD_SVG, RL_WORD_JSON
 typedef struct rl_arguments {
     const char *operand;    /* or NULL */
     rl_options run;         /* handed to rl_session_open as it is, after .pipeline and .log are set */
+    const char *trace;      /* or NULL */
+    int size[2];            /* bench: width, height; 0 = the capture's */
     int on_missing, format; /* words, as indices of rl_on_missing and rl_plan_word */
     bool json, quiet, verbose, help;
 } rl_arguments;

@@ -114,6 +114,9 @@ void rl_report_run_begin(rl_reporter *r)
 {
     r->begin = now_ns();
     r->n_files = 0;
+    r->done = r->total = 0;
+    memset(r->staged, 0, sizeof r->staged);
+    rl_str_free(&r->failed);
 }
 
 /* JSON is UTF-8 and file names need not be: bytes that are no text become '?'. */
@@ -161,11 +164,24 @@ static void frame_line(rl_reporter *r, const rl_frame_result *f)
     fflush(r->err);
 }
 
-static void draw_bar(rl_reporter *r, size_t done, size_t total)
+/* "  reading 12, kernels 11, writing 10": they overlap. */
+static void add_stages(const rl_reporter *r)
+{
+    static const char *const verbs[RL_LANES] = {"reading", "kernels", NULL, "writing"};
+    const char *between = "  ";
+    for (int i = 0; i < RL_LANES; i++)
+        if (verbs[i] && r->staged[i]) {
+            fprintf(r->err, "%s%s %lld", between, verbs[i], r->stages[i]);
+            between = ", ";
+        }
+}
+
+static void draw_bar(rl_reporter *r)
 {
     enum { WIDTH = 30 };
     uint64_t now = now_ns();
-    if (r->bar && done < total && now - r->bar_at < 50000000u)
+    size_t done = r->done, total = r->total;
+    if (r->bar && (done < total || !total) && now - r->bar_at < 50000000u)
         return; /* 20 times a second is enough */
     double seconds = (double)(now - r->begin) * 1e-9;
     double rate = seconds > 0 ? (double)done / seconds : 0;
@@ -175,11 +191,25 @@ static void draw_bar(rl_reporter *r, size_t done, size_t total)
     memset(bar, '.', WIDTH);
     memset(bar, '#', (size_t)full);
     bar[WIDTH] = 0;
-    fprintf(r->err, CLEAR_LINE "[%s] %zu/%zu  %.*f frames/s  %ld:%02ld left", bar, done, total,
-            rate < 10 ? 2 : 0, rate, left / 60, left % 60);
+    if (total)
+        fprintf(r->err, CLEAR_LINE "[%s] %zu/%zu  %.*f frames/s  %ld:%02ld left", bar, done, total,
+                rate < 10 ? 2 : 0, rate, left / 60, left % 60);
+    else
+        fputs(CLEAR_LINE "first frame:", r->err);
+    add_stages(r);
     fflush(r->err);
     r->bar = true;
     r->bar_at = now;
+}
+
+void rl_report_stage(rl_reporter *r, rl_lane lane, long long frame)
+{
+    pthread_mutex_lock(&r->lock);
+    r->stages[lane] = frame;
+    r->staged[lane] = true;
+    if (r->terminal && !r->quiet)
+        draw_bar(r);
+    pthread_mutex_unlock(&r->lock);
 }
 
 void rl_report_frame(rl_reporter *r, const rl_frame_result *f)
@@ -187,17 +217,19 @@ void rl_report_frame(rl_reporter *r, const rl_frame_result *f)
     bool failed = f->error && f->error->code;
     pthread_mutex_lock(&r->lock);
     r->n_files += f->n_files;
+    r->done = f->done;
+    r->total = f->total;
     if (failed) {
         rl_error with_place = *f->error;
         if (!with_place.file[0])
             snprintf(with_place.file, sizeof with_place.file, "%s frame %lld", f->capture, f->frame);
         error_line(r, &with_place);
-        rl_str_printf(&r->failed, "%s%s %lld", r->failed.length ? ", " : "", f->capture, f->frame);
+        rl_str_printf(&r->failed, "  %s frame %lld: %s\n", f->capture, f->frame, f->error->text);
     }
     if (r->json)
         frame_json(r, f);
     if (r->terminal && !r->quiet)
-        draw_bar(r, f->done, f->total);
+        draw_bar(r);
     else if (!r->quiet && !r->json && !failed)
         frame_line(r, f);
     pthread_mutex_unlock(&r->lock);
@@ -210,9 +242,10 @@ void rl_report_run_end(rl_reporter *r, const rl_run_summary *s, bool stopped)
     pthread_mutex_lock(&r->lock);
     hide_bar(r);
     if (stopped)
-        fprintf(r->err, "stopped: %zu frames were finished, the others were not begun\n", s->frames);
+        fprintf(r->err, "stopped: %zu frames were finished, the others were not begun; the same command with --resume goes on\n",
+                s->frames);
     if (s->failed)
-        fprintf(r->err, "%zu of %zu frames failed: %s\n", s->failed, s->frames, rl_str_text(&r->failed));
+        fprintf(r->err, "%zu of %zu frames failed:\n%s", s->failed, s->frames, rl_str_text(&r->failed));
     if (!r->quiet)
         fprintf(r->err, "%zu %s, %zu %s in %.2f s (%.2f frames/s), peak memory %s\n", s->frames,
                 s->frames == 1 ? "frame" : "frames", r->n_files, r->n_files == 1 ? "file" : "files", seconds,

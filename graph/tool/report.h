@@ -24,7 +24,10 @@ typedef struct rl_reporter {
     bool bar;        /* a progress bar stands on the terminal's last line */
     uint64_t bar_at; /* ns, when it was drawn */
     uint64_t begin;  /* ns on CLOCK_MONOTONIC */
-    rl_str failed;   /* "monkey 3, monkey 7" */
+    long long stages[RL_LANES]; /* the frame that each stage is at, */
+    bool staged[RL_LANES];      /* if it is at one */
+    size_t done, total;         /* of the last frame that was reported */
+    rl_str failed; /* a line for each frame that failed: "monkey frame 3: why" */
     size_t n_files;
 } rl_reporter;
 
@@ -39,6 +42,7 @@ rl_code rl_report_result(rl_reporter *r, const char *text, rl_error *err);
 
 /* Progress of a run. A frame: a bar on a terminal, a line elsewhere, an object with --json. */
 void rl_report_run_begin(rl_reporter *r);
+void rl_report_stage(rl_reporter *r, rl_lane lane, long long frame);
 void rl_report_frame(rl_reporter *r, const rl_frame_result *frame);
 void rl_report_run_end(rl_reporter *r, const rl_run_summary *summary, bool stopped);
 

@@ -31,6 +31,7 @@ int rl_cmd_init(rl_tool *tool, rl_error *err);
 int rl_cmd_inspect(rl_tool *tool, rl_error *err);
 int rl_cmd_passes(rl_tool *tool, rl_error *err);
 int rl_cmd_devices(rl_tool *tool, rl_error *err);
+int rl_cmd_bench(rl_tool *tool, rl_error *err);
 
 /* Prints s on stdout and frees it; the exit status. */
 int rl_tool_print(rl_tool *tool, rl_str *s, rl_error *err);

@@ -1,0 +1,30 @@
+/* What executor.c and executor_history.c share. */
+#ifndef RL_RUN_EXECUTOR_PARTS_H
+#define RL_RUN_EXECUTOR_PARTS_H
+
+#include "graph/run/executor.h"
+
+/* What a live node needs besides images. */
+typedef struct rl_node_state {
+    rl_program *program;
+    rl_memory *params, *tables; /* NULL when the pass has none */
+} rl_node_state;
+
+struct rl_executor {
+    rl_arena arena;
+    rl_device *device;
+    const rl_plan *plan;
+    const rl_materials *material_table;
+    const rl_log *log;
+    rl_node_state *nodes; /* [graph->n_nodes] */
+    rl_program *convert;
+    rl_memory *materials, *frame, *lights, *ambient;
+    rl_geometry geometry; /* columns 0: no size yet */
+    rl_memory **slots;    /* [plan->n_slots] */
+    rl_memory **history;  /* [plan->n_buffers][2]; NULL where the buffer is not HISTORY */
+    int newest;           /* which half of the pairs this frame writes */
+    bool has_history;
+    camera_t previous;
+};
+
+#endif

@@ -1,0 +1,178 @@
+/* What a frame is before its pixels: the files that hold its layers, its windows, its camera. */
+#include <string.h>
+
+#include "graph/run/camera.h"
+#include "graph/run/reader_parts.h"
+
+static rl_code missing_channel(const rl_layer *layer, const rl_exr *file, const char *channel, rl_error *err)
+{
+    rl_str text = {0};
+    for (int p = 0; p < rl_exr_parts(file); p++) {
+        const rl_exr_part *part = rl_exr_part_at(file, p);
+        for (size_t i = 0; i < part->n_channels && text.length < 600; i++)
+            rl_str_printf(&text, " %s%s%s", rl_exr_parts(file) > 1 ? part->name : "",
+                          rl_exr_parts(file) > 1 ? ":" : "", part->channels[i].name);
+    }
+    rl_code code = rl_fail_file(err, RL_E_FORMAT, rl_exr_path(file),
+                                "layer '%s' needs channel '%s'; the file has:%s (set layers.%s in capture.yaml)",
+                                layer->name, channel, rl_str_text(&text), layer->name);
+    rl_str_free(&text);
+    return code;
+}
+
+/* The part that holds all channels of a layer. */
+rl_code rl_reader_find_part(const rl_layer *layer, const rl_exr *file, int *out, rl_error *err)
+{
+    int first = layer->part ? rl_exr_part_named(file, layer->part) : 0;
+    if (first < 0)
+        return rl_fail_file(err, RL_E_FORMAT, rl_exr_path(file), "layer '%s' needs part '%s', which the file does not have",
+                            layer->name, layer->part);
+    const char *missing = layer->channels[0];
+    for (int p = first; p < (layer->part ? first + 1 : rl_exr_parts(file)); p++) {
+        int have = 0;
+        for (; have < layer->n_channels; have++)
+            if (!rl_exr_channel_named(rl_exr_part_at(file, p), layer->channels[have]))
+                break;
+        if (have == layer->n_channels) {
+            *out = p;
+            return RL_OK;
+        }
+        missing = have > 0 ? layer->channels[have] : missing;
+    }
+    return missing_channel(layer, file, missing, err);
+}
+
+/* ---- headers --------------------------------------------------------------------------------------------- */
+
+static bool number_attr(const rl_exr *file, int part, const char *name, int n, double *out)
+{
+    rl_exr_value v;
+    if (!rl_exr_attr(file, part, name, &v) || rl_exr_type_numbers(v.type) != n)
+        return false;
+    memcpy(out, v.v, (size_t)n * sizeof *out);
+    return true;
+}
+
+static void read_lens(rl_reader *r, const rl_frame *f, int file_number, rl_camera_info *c)
+{
+    const rl_exr *file = f->files[f->main_file];
+    const rl_exr_part *part = rl_exr_part_at(file, f->main_part);
+    const double *fov = rl_manifest_fov_x(r->setup.manifest, file_number);
+    const double *jitter = rl_manifest_jitter(r->setup.manifest, file_number);
+    c->screen_width = (double)part->screen_width;
+    c->screen_center[0] = (double)part->screen_center[0];
+    c->screen_center[1] = (double)part->screen_center[1];
+    c->pixel_aspect = (double)part->pixel_aspect;
+    if (fov) {
+        c->fov_x = *fov;
+    } else if (!number_attr(file, f->main_part, "camera:fovx", 1, &c->fov_x) && !r->said_window) {
+        r->said_window = true;
+        rl_report(r->setup.log, c->screen_width == 1 ? RL_WARNING : RL_VERBOSE, (rl_where){.file = rl_exr_path(file)},
+                  "no attribute camera:fovx: the field of view is taken from screenWindowWidth %g%s", c->screen_width,
+                  c->screen_width == 1 ? ", which writers leave at 1 when they do not know it (set camera.fov_x in the manifest)"
+                                       : "");
+    }
+    if (jitter) {
+        memcpy(c->jitter, jitter, sizeof c->jitter);
+    } else if (!number_attr(file, f->main_part, "camera:jitter", 2, c->jitter) && !r->said_jitter) {
+        r->said_jitter = true;
+        rl_report(r->setup.log, RL_VERBOSE, (rl_where){.file = rl_exr_path(file)},
+                  "no attribute camera:jitter: samples lie at the pixels' centres");
+    }
+}
+
+static rl_code read_camera(rl_reader *r, rl_frame *f, int file_number, rl_error *err)
+{
+    const rl_exr *file = f->files[f->main_file];
+    double header[16];
+    float header_f[16];
+    bool has = number_attr(file, f->main_part, "worldToCamera", 16, header);
+    for (int i = 0; i < 16 && has; i++)
+        header_f[i] = (float)header[i];
+    rl_camera_info c = {.display = {f->display_window.x0, f->display_window.y0,
+                                    f->display_window.x1 - f->display_window.x0 + 1,
+                                    f->display_window.y1 - f->display_window.y0 + 1}};
+    rl_error inner = {0};
+    rl_code code = rl_manifest_view(r->setup.manifest, file_number, has ? header_f : NULL, c.view, &inner);
+    if (!code) {
+        read_lens(r, f, file_number, &c);
+        code = rl_camera_make(&c, &f->camera, &inner);
+    }
+    if (code)
+        return rl_fail(err, code, (rl_where){inner.file[0] ? inner.file : rl_exr_path(file), inner.line, inner.column}, "%s",
+                       inner.text);
+    return RL_OK;
+}
+
+static bool same_box(rl_exr_box a, rl_exr_box b)
+{
+    return a.x0 == b.x0 && a.y0 == b.y0 && a.x1 == b.x1 && a.y1 == b.y1;
+}
+
+/* Every wanted layer has its channels, and all have one size. */
+static rl_code check_layers(rl_reader *r, rl_frame *f, rl_error *err)
+{
+    rl_exr_box window = f->data_window;
+    for (int i = 0; i < r->n_bindings; i++) {
+        const rl_layer *layer = r->bindings[i].layer;
+        const rl_exr *file = f->files[layer->pattern];
+        int part = 0;
+        rl_code code = rl_reader_find_part(layer, file, &part, err);
+        if (code)
+            return code;
+        rl_exr_box w = rl_exr_part_at(file, part)->data_window;
+        if (!same_box(w, window))
+            return rl_fail_file(err, RL_E_FORMAT, rl_exr_path(file),
+                                "layer '%s' has the data window (%d, %d) - (%d, %d), layer 'depth' (%d, %d) - (%d, %d): all "
+                                "layers of a frame must have one size",
+                                layer->name, w.x0, w.y0, w.x1, w.y1, window.x0, window.y0, window.x1, window.y1);
+    }
+    return RL_OK;
+}
+
+static rl_code open_files(rl_reader *r, int file_number, rl_frame *f, rl_error *err)
+{
+    rl_code code = RL_OK;
+    rl_arena arena = {0};
+    for (int i = 0; i < r->n_bindings && !code; i++) {
+        const rl_layer *layer = r->bindings[i].layer;
+        if (layer->pattern >= RL_MOST_FILES)
+            code = rl_fail(err, RL_E_CONFIG, layer->where, "a capture can have at most %d files a frame", RL_MOST_FILES);
+        else if (!f->files[layer->pattern]) {
+            const char *path = rl_manifest_path(&arena, r->setup.manifest, layer, file_number);
+            code = path ? rl_exr_open(path, r->setup.limit, &f->files[layer->pattern], err) : rl_fail_memory(err, 1);
+        }
+    }
+    rl_arena_free(&arena);
+    return code;
+}
+
+rl_code rl_reader_open(rl_reader *r, int file_number, rl_frame *f, rl_error *err)
+{
+    rl_frame_release(f);
+    if (r->setup.manifest->n_patterns == 0)
+        return rl_fail(err, RL_E_CONFIG, r->setup.manifest->where,
+                       "capture '%s' has 'files: memory': its frames must come through the C API",
+                       r->setup.manifest->name);
+    rl_code code = open_files(r, file_number, f, err);
+    const rl_layer *depth = r->bindings[r->depth].layer;
+    f->main_file = depth->pattern;
+    if (!code)
+        code = rl_reader_find_part(depth, f->files[f->main_file], &f->main_part, err);
+    if (code)
+        return code;
+    const rl_exr_part *part = rl_exr_part_at(f->files[f->main_file], f->main_part);
+    f->data_window = part->data_window;
+    f->display_window = part->display_window;
+    code = check_layers(r, f, err);
+    if (!code)
+        code = rl_geometry_make(f->data_window.x0, f->data_window.y0, part->width, part->height, &f->geometry, err);
+    if (!code)
+        code = read_camera(r, f, file_number, err);
+    return code;
+}
+
+bool rl_reader_missed(rl_code code)
+{
+    return code == RL_E_IO || code == RL_E_FORMAT;
+}

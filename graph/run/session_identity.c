@@ -1,0 +1,109 @@
+/* What decides the bits of a run's pictures besides its inputs, as hashes. */
+#include <string.h>
+#include <xxhash.h>
+
+#include "graph/base/file.h"
+#include "graph/run/kernel_source.h"
+#include "graph/run/session_state.h"
+
+static uint64_t add_text(uint64_t hash, const char *text)
+{
+    return XXH3_64bits_withSeed(text ? text : "", text ? strlen(text) : 0, hash + 1);
+}
+
+static uint64_t add_bytes(uint64_t hash, const void *data, size_t n)
+{
+    return XXH3_64bits_withSeed(n ? data : "", n, hash + 1);
+}
+
+static uint64_t hash_pipeline(const rl_session *s)
+{
+    const rl_options *o = &s->options;
+    uint64_t h = add_bytes(0, &s->pipeline->hash, sizeof s->pipeline->hash);
+    h = add_text(h, s->pipeline->name);
+    for (size_t i = 0; i < s->n_outputs; i++) /* --only and --dump choose them */
+        h = add_text(h, s->outputs[i].spec->name);
+    return add_bytes(h, o->crop, sizeof o->crop);
+}
+
+/* The manifest, whatever folder it lies in and however many frames it lists: the frames are in the chain, and
+ * a capture that grew can be gone on with. */
+static rl_code hash_capture(const rl_session *s, const rl_sequence *q, uint64_t *out, rl_error *err)
+{
+    rl_arena arena = {0};
+    rl_str text = {0};
+    rl_manifest m = *q->manifest;
+    rl_pattern *patterns = rl_arena_array(&arena, (size_t)m.n_patterns + 1, sizeof *patterns);
+    for (int i = 0; patterns && i < m.n_patterns; i++) {
+        patterns[i] = m.patterns[i];
+        patterns[i].path = rl_path_name(patterns[i].path);
+    }
+    m.patterns = patterns;
+    m.frames = (rl_frames){0};
+    if (patterns)
+        rl_manifest_print(&m, &text);
+    bool failed = !patterns || text.failed;
+    uint64_t h = add_text(0, rl_str_text(&text));
+    char colors[256];
+    rl_ocio_fingerprint(s->ocio, colors, sizeof colors);
+    h = add_text(add_text(h, colors), s->working);
+    rl_str_free(&text);
+    rl_arena_free(&arena);
+    *out = h;
+    return failed ? rl_fail_memory(err, 1) : RL_OK;
+}
+
+static rl_code hash_plan(const rl_sequence *q, uint64_t *out, rl_error *err)
+{
+    rl_str text = {0};
+    rl_code code = rl_plan_print_json(q->plan, NULL, 1, &text, err);
+    if (!code && text.failed)
+        code = rl_fail_memory(err, text.length);
+    *out = add_text(0, rl_str_text(&text));
+    rl_str_free(&text);
+    return code;
+}
+
+/* Texts, parameters and tables of all that runs, and the materials. */
+static rl_code hash_kernels(const rl_sequence *q, uint64_t *out, rl_error *err)
+{
+    const rl_materials *m = q->materials;
+    rl_arena arena = {0};
+    rl_code code = RL_OK;
+    uint64_t h = add_bytes(0, m->data, m->count * m->entry_bytes);
+    for (size_t i = 0; i < m->n_ids; i++) {
+        h = add_bytes(h, &m->ids[i].id, sizeof m->ids[i].id);
+        h = add_bytes(h, &m->ids[i].dense, sizeof m->ids[i].dense);
+    }
+    for (size_t i = 0; i < q->plan->n_nodes && !code; i++) {
+        const rl_graph_node *g = &q->graph->nodes[q->plan->nodes[i].node];
+        rl_pass_input in = {.pass = g->pass, .params = g->params, .materials = m};
+        rl_tables tables = {0};
+        rl_str text = {0};
+        code = rl_kernel_text(&arena, q->plan, &q->plan->nodes[i], &text, err);
+        if (!code && g->pass->tables)
+            code = g->pass->tables(&in, &arena, &tables, err);
+        h = add_bytes(add_text(h, rl_str_text(&text)), g->params, g->pass->params_size);
+        h = add_bytes(h, tables.data, tables.n * sizeof *tables.data);
+        rl_str_free(&text);
+    }
+    rl_arena_free(&arena);
+    *out = h;
+    return code;
+}
+
+rl_code rl_session_identity(const rl_session *s, const rl_sequence *q, rl_identity *out, rl_error *err)
+{
+    const rl_device_info *d = rl_device_about(s->device);
+    *out = (rl_identity){0};
+    out->part[RL_ID_VERSION] = add_text(0, RL_VERSION);
+    out->part[RL_ID_PIPELINE] = hash_pipeline(s);
+    out->part[RL_ID_DEVICE] =
+        add_text(add_text(add_text(add_text(0, d->name), d->platform), d->version), d->driver);
+    rl_code code = hash_capture(s, q, &out->part[RL_ID_CAPTURE], err);
+    if (!code)
+        code = hash_plan(q, &out->part[RL_ID_PLAN], err);
+    if (!code)
+        code = hash_kernels(q, &out->part[RL_ID_KERNELS], err);
+    return code;
+}
