@@ -149,8 +149,8 @@ static place find_place(const shade_run *run, int x, int y)
     return p;
 }
 
-/* Whether history pixel (x, y) or most of 3x3 around it show the surface of p or, where p is not alone, the 3x3 around
- * each pixel around (px, py) show its material at depths around p's. */
+/* Whether history pixel (x, y) or most of 3x3 around it show the surface of p or, where p is not alone, the
+ * 3x3 around each pixel around (px, py) show its material at depths around p's. */
 static bool shows(const shade_run *run, int x, int y, double px, double py, uint32_t id, const place *p)
 {
     double low = 2 * far_depth, high = 0, z = p->then;
