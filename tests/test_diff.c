@@ -21,6 +21,7 @@ enum { W = 40, H = 30, N = W * H };
 
 static char *folder;
 static float pixels[4][N];
+static rl_exr_pixel exr_type = RL_EXR_FLOAT;
 
 /* ---- files -----------------------------------------------------------------------------------------------
  */
@@ -52,7 +53,7 @@ static char *write_exr(const char *name, const char *const *names, rl_exr_box wi
     rl_exr_source channels[8];
     size_t n = 0;
     for (; names[n]; n++)
-        channels[n] = (rl_exr_source){names[n], RL_EXR_FLOAT, pixels[n % 4], NULL, W};
+        channels[n] = (rl_exr_source){names[n], exr_type, pixels[n % 4], NULL, W};
     rl_exr_image image = {.data_window = window,
                           .display_window = window,
                           .channels = channels,
@@ -232,6 +233,9 @@ static void test_not_finite(void **state)
     char *a = write_exr("a.exr", rgb, box, NULL);
     pixels[1][7 * W + 13] = (float)NAN;
     char *nan = write_exr("nan.exr", rgb, (rl_exr_box){0, 0, W - 1, H - 1}, NULL);
+    exr_type = RL_EXR_HALF;
+    char *half = write_exr("half.exr", rgb, box, NULL);
+    exr_type = RL_EXR_FLOAT;
     char *tif = write_png("nan.tif", 3, RL_IMAGE_FLOAT);
     pixels[1][7 * W + 13] = -INFINITY;
     char *inf = write_exr("inf.exr", rgb, box, NULL);
@@ -241,6 +245,7 @@ static void test_not_finite(void **state)
     for (int m = 0; m < 2; m++) {
         const char *metric = m ? "max" : "hdrflip";
         refuse(DIFF(a, nan, "--metric", metric), "nan.exr: error: channel 'G' holds NaN at pixel (13, 7)");
+        refuse(DIFF(half, a, "--metric", metric), "half.exr: error: channel 'G' holds NaN at pixel (13, 7)");
         refuse(DIFF(nan, nan, "--metric", metric), "holds NaN at pixel (13, 7)");
         refuse(DIFF(tif, a, "--metric", metric), "nan.tif: error: channel 'G' holds NaN at pixel (13, 7)");
         refuse(DIFF(a, inf, "--metric", metric), "holds -infinity at pixel (13, 7)");
@@ -248,7 +253,7 @@ static void test_not_finite(void **state)
     tool_result r = DIFF(a, alpha); /* alpha is not compared */
     expect(&r, 0, NULL);
     tool_result_free(&r);
-    char *all[] = {a, nan, tif, inf, alpha};
+    char *all[] = {a, nan, half, tif, inf, alpha};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++)
         free(all[i]);
 }

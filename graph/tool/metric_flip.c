@@ -118,7 +118,8 @@ static double color_error(const rl_flip *f, const filtered *rows, int x)
 {
     double lab[2][3];
     for (int k = 0; k < 2; k++) {
-        double opponent[3] = {rows->at[k][V_Y][x], rows->at[k][V_CX][x], rows->at[k][V_CZ1][x] + rows->at[k][V_CZ2][x]};
+        double opponent[3] = {rows->at[k][V_Y][x], rows->at[k][V_CX][x],
+                              rows->at[k][V_CZ1][x] + rows->at[k][V_CZ2][x]};
         double rgb[3];
         rl_rgb_from_opponent(&f->rgb_from_xyz, opponent, rgb);
         for (int c = 0; c < 3; c++)

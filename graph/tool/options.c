@@ -410,6 +410,8 @@ enum { COMMAND_COLUMN = 20, OPTION_COLUMN = 26 };
 static void add_row(rl_str *s, int column, const char *left, const char *help)
 {
     rl_str_printf(s, "  %-*s", column - 2, left);
+    if (strlen(left) > (size_t)column - 4)
+        rl_str_printf(s, "\n%*s", column, "");
     for (const char *at = help; at; at = strchr(at, '\n') ? strchr(at, '\n') + 1 : NULL)
         rl_str_printf(s, "%*s%.*s\n", at == help ? 0 : column, "", (int)strcspn(at, "\n"), at);
 }
