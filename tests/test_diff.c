@@ -67,6 +67,12 @@ static char *write_exr(const char *name, const char *const *names, rl_exr_box wi
     return path;
 }
 
+static void free_all(char *const *paths)
+{
+    for (; *paths; paths++)
+        free(*paths);
+}
+
 static const rl_exr_box box = {0, 0, W - 1, H - 1};
 static const char *const rgb[] = {"R", "G", "B", NULL}, *const rgba[] = {"R", "G", "B", "A", NULL};
 
@@ -176,9 +182,7 @@ static void test_defaults(void **state)
     expect(&r, 0, NULL);
     assert_true(strstr(r.out, "max of ") == r.out && strstr(r.out, "  p95     0.1\n"));
     tool_result_free(&r);
-    char *all[] = {a8, a, a16, tif, b8, b};
-    for (size_t i = 0; i < sizeof all / sizeof *all; i++)
-        free(all[i]);
+    free_all((char *[]){a8, a, a16, tif, b8, b, NULL});
 }
 
 static void test_fail_over(void **state)
@@ -253,9 +257,7 @@ static void test_not_finite(void **state)
     tool_result r = DIFF(a, alpha); /* alpha is not compared */
     expect(&r, 0, NULL);
     tool_result_free(&r);
-    char *all[] = {a, nan, half, tif, inf, alpha};
-    for (size_t i = 0; i < sizeof all / sizeof *all; i++)
-        free(all[i]);
+    free_all((char *[]){a, nan, half, tif, inf, alpha, NULL});
 }
 
 static void test_pairs_that_do_not_fit(void **state)
@@ -281,9 +283,7 @@ static void test_pairs_that_do_not_fit(void **state)
     refuse(DIFF(a, a, "--metric", "flop"), "did you mean 'flip'?");
     refuse(DIFF(a, a, "--heatmap", "x.nothing"), "nothing");
     refuse(DIFF(a, a, "--frames", "1"), "option '--frames' does nothing here");
-    char *all[] = {a, png, small, moved, grey, missing, text};
-    for (size_t i = 0; i < sizeof all / sizeof *all; i++)
-        free(all[i]);
+    free_all((char *[]){a, png, small, moved, grey, missing, text, NULL});
 }
 
 static void test_layers(void **state)
@@ -319,9 +319,7 @@ static void test_layers(void **state)
     expect_json(DIFF(n, n, "--json", "--metric", "max"), "max", s);
     expect_json(DIFF(motion, motion2, "--json", "--metric", "rmse"), "rmse", s);
     assert_close(s[3], 0, 0);
-    char *all[] = {plain, layer, both, many, n, v, blue, motion, motion2};
-    for (size_t i = 0; i < sizeof all / sizeof *all; i++)
-        free(all[i]);
+    free_all((char *[]){plain, layer, both, many, n, v, blue, motion, motion2, NULL});
 }
 
 static void test_primaries(void **state)
@@ -371,10 +369,7 @@ static void test_heatmap(void **state)
                 (double)file.planes[N + 3 * W + W - 1]); /* most: brightest */
     rl_image_file_free(&file);
     refuse(DIFF(a, b, "--heatmap", nowhere), "heat.png: error: ");
-    free(a);
-    free(b);
-    free(heat);
-    free(nowhere);
+    free_all((char *[]){a, b, heat, nowhere, NULL});
 }
 
 static int setup(void **state)
