@@ -26,10 +26,10 @@ int main(int argc, char **argv)
                 fprintf(stderr, "%s\n", t.err.text);
                 return 1;
             }
-            printf("cam %d obj %d plain %d motion %d: raw %.2f taa %.2f dB p95 %.4f disocc %ld %.4f behind %.4f (raw %.4f) ahead "
+            printf("cam %d obj %d plain %d motion %d: raw %.2f taa %.2f dB p95 %.4f disocc %ld %.4f behind %.4f  ahead "
                    "%.4f\n",
                    scenes[i].camera_moves, scenes[i].object_moves, scenes[i].plain, m, r.raw_psnr, r.psnr, r.p95, r.disoccluded,
-                   r.disoccluded_difference, r.behind, r.behind_raw, r.ahead);
+                   r.disoccluded_difference, r.behind, r.ahead);
             fflush(stdout);
             temporal_report_free(&r);
             temporal_close(&t);

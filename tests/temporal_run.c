@@ -173,8 +173,8 @@ static void look_at_disoccluded(const temporal_scene *s, int number, temporal_re
 }
 
 typedef struct trail {
-    double behind, ahead, raw;
-    long n_behind, n_ahead;
+    double behind, ahead, far, far_raw; /* sums */
+    long n_behind, n_ahead, n_far;
 } trail;
 
 static void look_beside_sphere(const temporal_scene *s, int number, const temporal_report *r, trail *t)
@@ -190,8 +190,12 @@ static void look_beside_sphere(const temporal_scene *s, int number, const tempor
                 t->n_ahead++;
             } else {
                 t->behind += error_at(r->result, r->truth, i);
-                t->raw += error_at(r->frame.color, r->truth, i);
                 t->n_behind++;
+            }
+            if (d < -3) {
+                t->far += error_at(r->result, r->truth, i);
+                t->far_raw += error_at(r->frame.color, r->truth, i);
+                t->n_far++;
             }
         }
     }
@@ -223,7 +227,8 @@ bool temporal_sequence(temporal_session *t, const temporal_scene *scene, int fra
     r->raw_psnr = -10 * log10(raw);
     r->psnr = -10 * log10(done);
     r->behind = beside.behind / fmax((double)beside.n_behind, 1);
-    r->behind_raw = beside.raw / fmax((double)beside.n_behind, 1);
+    r->far_behind = beside.far / fmax((double)beside.n_far, 1);
+    r->far_behind_raw = beside.far_raw / fmax((double)beside.n_far, 1);
     r->ahead = beside.ahead / fmax((double)beside.n_ahead, 1);
     return true;
 }

@@ -34,7 +34,7 @@ typedef struct temporal_report {
     long disoccluded;              /* pixels, in all frames, whose surroundings were all hidden before */
     double disoccluded_difference; /* the largest difference between result and sample there */
     double behind, ahead;          /* mean error of the background 1 to 8 pixels behind and in front of the sphere */
-    double behind_raw;             /* of the samples, behind */
+    double far_behind, far_behind_raw; /* 3 to 8 pixels behind: of the results, of the samples */
     temporal_frame frame;          /* the last one */
     float *result[3], *truth[3], *count;
 } temporal_report;

@@ -22,6 +22,7 @@ typedef struct rl_slot_state {
     rl_inputs inputs; /* its own files */
     uint64_t content; /* theirs, and of the frame that it holds */
     uint64_t chain;
+    uint64_t hoped;      /* its chain if its own files could be used */
     rl_checkpoint saved; /* history NULL: none to be written */
     double saved_s;      /* seconds that taking it cost */
 } rl_slot_state;
