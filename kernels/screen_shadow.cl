@@ -2,7 +2,8 @@
  * GPU Screen-Space Ray Tracing", JCGT 2014. Behind surface.cl, in front of lighting.cl.
  *
  * What is not on the image casts no shadow: occluders out of sight, behind others or beyond the border. What is on it is taken for
- * a slab as deep as shadow_thickness_m. Where the whole way takes at most shadow_steps pixels, the answer is that for the depth
+ * a slab as deep as shadow_thickness_m; between two pixels the slab's back is that of the nearer one, so that an edge before
+ * something far behind it has no curtain. Where the whole way takes at most shadow_steps pixels, the answer is that for the depth
  * buffer (1/z linear between pixels, so that a plane never shadows itself); beyond, only every n-th pixel is looked at, from a
  * random first one, and occluders narrower than that are missed at some pixels (noise). */
 
@@ -50,8 +51,8 @@ static inline void lay_track(track_t *t, constant frame_t *f, constant light_t *
     t->last = ahead > 0.0f ? fmin(border, ceil(g / ahead) - 1.0f) : border;
 }
 
-/* The surface's depth at a place between two pixels of a row or a column; a huge one where nothing is. */
-static inline floatv surface_depth(global const float *depth, constant frame_t *f, floatv x, floatv y, intv on)
+/* The surface's depth at a place between two pixels of a row or a column, and the nearer of theirs; huge where nothing is. */
+static inline floatv surface_depth(global const float *depth, constant frame_t *f, floatv x, floatv y, intv on, floatv *nearer)
 {
     floatv left = floor(x), top = floor(y), part = (x - left) + (y - top), a, b;
     intv ix = clamp(rl_to_intv(left), f->valid[0], f->valid[2] - 1), iy = clamp(rl_to_intv(top), f->valid[1], f->valid[3] - 1);
@@ -70,6 +71,7 @@ static inline floatv surface_depth(global const float *depth, constant frame_t *
     b = rl_vload(0, far);
     a = rl_select((floatv)0.0f, 1.0f / fmax(a, 1e-20f), a > 0.0f);
     b = rl_select((floatv)0.0f, 1.0f / fmax(b, 1e-20f), b > 0.0f);
+    *nearer = 1.0f / fmax(fmax(a, b), 1e-20f);
     return 1.0f / fmax(mix(a, b, part), 1e-20f);
 }
 
@@ -97,9 +99,9 @@ static inline floatv march(global const float *depth, constant params_t *p, cons
         i = first_step(p, f, stride, which, x, y);
     intv going = on & (i <= t.last);
     while (rl_any(going)) {
-        floatv surface = surface_depth(depth, f, fma(i, t.rayx, t.x), fma(i, t.rayy, t.y), going);
+        floatv front, surface = surface_depth(depth, f, fma(i, t.rayx, t.x), fma(i, t.rayy, t.y), going, &front);
         floatv d = z / fmax(1.0f - i * t.bend, 1e-9f);
-        intv hit = going & (d > surface + p->shadow_bias_m) & (fmin(d, before) < surface + p->shadow_thickness_m);
+        intv hit = going & (d > surface + p->shadow_bias_m) & (fmin(d, before) < front + p->shadow_thickness_m);
         visible = rl_select(visible, 0.0f, hit);
         before = d;
         i += stride;

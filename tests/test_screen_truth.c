@@ -151,7 +151,6 @@ static void test_truth(void **state)
     free(kind);
     free(seen);
     folder_remove(folder);
-    free(folder);
     scene_free(&s);
 }
 

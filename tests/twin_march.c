@@ -48,12 +48,13 @@ static double meet(const frame_t *f, const view_ray *r, int axis, int at)
     return t > 0 && t < r->end && r->point[2] + t * r->way[2] > 0 ? t : -1;
 }
 
-static double surface(const frame_t *f, const shade_image *depth, double x, double y)
+static double surface(const frame_t *f, const shade_image *depth, double x, double y, double *front)
 {
     int left = (int)floor(x), top = (int)floor(y);
     int right = left + (x > left && left + 1 < f->valid[2]), below = top + (y > top && top + 1 < f->valid[3]);
     double a = (double)*shade_at(depth, f, 0, left, top), b = (double)*shade_at(depth, f, 0, right, below);
     double part = (x - left) + (y - top), k = (a > 0 ? (1 - part) / a : 0) + (b > 0 ? part / b : 0);
+    *front = fmin(a > 0 ? a : INFINITY, b > 0 ? b : INFINITY);
     return k > 0 ? 1 / k : INFINITY;
 }
 
@@ -119,12 +120,12 @@ int twin_march(const frame_t *f, const march_params *p, const shade_image *depth
             at[k] = r.point[k] + t * r.way[k];
         xy[major] = from[major] + direction * i;
         xy[1 - major] = pixel(f, at, 1 - major);
-        double s = surface(f, depth, xy[0], xy[1]), near = fmin(at[2], before);
+        double front, s = surface(f, depth, xy[0], xy[1], &front), near = fmin(at[2], before);
         before = at[2];
         consider(isinf(s) ? 1 : at[2] / (s + (double)p->bias) - 1, margin);
         if (at[2] > s + (double)p->bias)
-            consider(near / (s + (double)p->thickness) - 1, margin);
-        if (at[2] > s + (double)p->bias && near < s + (double)p->thickness)
+            consider(near / (front + (double)p->thickness) - 1, margin);
+        if (at[2] > s + (double)p->bias && near < front + (double)p->thickness)
             return 0;
     }
     return 1;
