@@ -7,6 +7,7 @@
 #   make fuzz        changed inputs against parsers and readers, FUZZ_SECONDS=60 each
 #   make soak        2,000 frames: memory flat, nothing leaked
 #   make bench       kernels and codecs against their peers
+#   make temporal    CAPTURES="folders": temporal anti-aliasing against the truth, and its flicker: tables and strips
 #   make accuracy    TRUTH=folder: every model against a path-traced truth (tests/accuracy.c)
 #   make install     PREFIX=/usr/local: program, library, headers, relit.pc, configs, kernels
 #   make deps        Debian packages
@@ -106,6 +107,9 @@ $(BUILD)/kernels.o: $(BUILD)/kernels.c
 # Loops over every sample of a frame: gcc vectorizes them from -O3 on.
 $(BUILD)/graph/run/ingest.o: OPT += -O3
 
+# Sums over filter taps, the same.
+$(BUILD)/graph/tool/metric_filter.o: OPT += -O3
+
 # Where `make install` puts things that are looked for at run time; a build tree finds its own first.
 $(BUILD)/graph/run/image_module.o: CPPFLAGS += -DRL_MODULE_DIR='"$(PREFIX)/lib/relit"'
 $(BUILD)/graph/run/data_files.o: CPPFLAGS += -DRELIT_DATADIR='"$(PREFIX)/share/relit/configs"'
@@ -134,7 +138,7 @@ $(BUILD)/tests/%: $(BUILD)/tests/%.o $(BUILD)/tests/sanitizers.o $(BUILD)/tests/
 	$(Q)$(CC) $(LDFLAGS) -o $@ $^ $(LIBS) -lcmocka
 
 # They load the module; so does whatever writes PNG files.
-$(BUILD)/tests/test_image_file $(BUILD)/tests/test_sg_run: | $(BUILD)/relit_oiio.so
+$(BUILD)/tests/test_image_file $(BUILD)/tests/test_sg_run $(BUILD)/tests/test_diff: | $(BUILD)/relit_oiio.so
 
 test-build: all $(TESTS) $(BENCHES)
 
@@ -190,6 +194,9 @@ deps:
 	fi
 
 # Pictures of the error go to OUT.
+temporal: all $(BUILD)/tests/temporal
+	@$(BUILD)/tests/temporal $(CAPTURES)
+
 OUT ?= out/accuracy
 accuracy: all $(BUILD)/tests/accuracy
 	@test -n "$(TRUTH)" || { echo "give TRUTH=folder, as tests/accuracy_scene.h describes it" >&2; exit 2; }
@@ -221,4 +228,4 @@ layers:
 clean:
 	rm -rf $(BUILD) build-asan
 
-.PHONY: all demo bench test test-build test-asan deps install format format-check layers clean fuzz accuracy soak slurm-test
+.PHONY: all demo bench test test-build test-asan deps install format format-check layers clean fuzz accuracy soak slurm-test temporal

@@ -4,8 +4,33 @@
  * Golubev 2018 (transmission at entry and exit, texturing modes, thin and thick slabs), Helix (Beer-Lambert),
  * MJP (scattering as spherical Gaussians: the irradiance is complete, and goes into `lit`), Ramamoorthi and Hanrahan 2001
  * (irradiance of spherical harmonics),
+ * McGuire and Mara 2014 (shadows marched in the depth buffer),
  * Walter 2007 and Heitz 2014 (GGX, height-correlated Smith), Schlick 1994 (Fresnel). */
 #include "passes/shading_rows.h"
+
+typedef struct lighting_params {
+    int32_t shadow_steps;
+    float shadow_thickness_m;
+    float shadow_bias_m;
+    int32_t shadow_jitter;
+    int32_t seed;
+} lighting_params;
+
+static const rl_param params[] = {
+    P(lighting_params, RL_I32, shadow_steps, 1, 16384, 256, "steps",
+      "lights with shadow: screen: most places on the way to the light that are looked at; ways of up to so many pixels "
+      "miss nothing that the camera sees. Occluders out of its sight, or outside of the image or crop, cast no shadow, "
+      "back faces are not shadowed, and the shadow's thickness is unknown",
+      .source = "McGuire and Mara 2014"),
+    P(lighting_params, RL_F32, shadow_thickness_m, 0, 1e6, 0.1, "m",
+      "shadow: screen: how deep occluders are taken to be, along the view axis; rays that pass farther behind are free"),
+    P(lighting_params, RL_F32, shadow_bias_m, 0, 1e3, 0.001, "m",
+      "shadow: screen: how far behind the surface a ray must be to be blocked; raise it for depth in half precision"),
+    P(lighting_params, RL_BOOL, shadow_jitter, 0, 1, 1, "",
+      "shadow: screen: where shadow_steps does not reach every pixel, begin at a random one, a pixel and frame"),
+    P(lighting_params, RL_I32, seed, 0, 2147483647, 0, "", "of shadow_jitter"),
+};
+RL_PARAMS_MATCH(lighting_params, 5);
 
 static const rl_param profile_keys[] = {
     RL_ROW_SCATTER_DISTANCE(.required_with = "transmission=thin|thick"),
@@ -73,7 +98,9 @@ const rl_pass rl_pass_lighting = {
     .help = "direct and ambient light: diffuse transmission, specular reflection, translucency",
     .source = "Golubev 2018; Helix; Walter 2007; Heitz 2014",
     .kernel = "lighting.cl",
-    .kernel_prelude = "sg.cl surface.cl sg_shade.cl",
+    .kernel_prelude = "sg.cl surface.cl sg_shade.cl screen_shadow.cl",
+    .params = RL_ARRAY(params),
+    .params_size = sizeof(lighting_params),
     .profile_keys = RL_ARRAY(profile_keys),
     .material_keys = RL_ARRAY(material_keys),
     .shading_keys = RL_ARRAY(shading_keys),

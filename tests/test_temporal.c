@@ -1,4 +1,5 @@
-/* Temporal anti-aliasing through a session, on sequences whose box-filtered truth is known; and where history ends. */
+/* Temporal anti-aliasing through a session, on sequences whose box-filtered truth is known; and where history
+ * ends. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -19,7 +20,8 @@ static void run_on(const temporal_scene *scene, bool motion, int frames, int com
     temporal_close(&t);
 }
 
-/* ---- against the truth -------------------------------------------------------------------------------------------- */
+/* ---- against the truth
+ * -------------------------------------------------------------------------------------------- */
 
 /* 64 jittered frames of what stands still, blend 0: as good as their plain mean. */
 static void still_frames_reach_the_truth(void **state)
@@ -59,8 +61,8 @@ static void still_frames_reach_the_truth(void **state)
 
 static void print(const char *what, const temporal_report *r)
 {
-    print_message("%-32s PSNR %.2f -> %.2f dB, p95 %.4f, %ld disoccluded pixels differ by up to %g\n", what, r->raw_psnr,
-                  r->psnr, r->p95, r->disoccluded, r->disoccluded_difference);
+    print_message("%-32s PSNR %.2f -> %.2f dB, p95 %.4f, %ld disoccluded pixels differ by up to %g\n", what,
+                  r->raw_psnr, r->psnr, r->p95, r->disoccluded, r->disoccluded_difference);
 }
 
 /* With exact motion; with motion withheld as well where nothing but the camera moves. */
@@ -102,8 +104,8 @@ static void withheld_motion_uncovers_afresh(void **state)
     temporal_report_free(&r);
 }
 
-/* In front of a plain wall every trail would show. Without motion vectors an object's edge may drag along the two pixels
- * next to it, since jitter alone could have put them on its other side. */
+/* In front of a plain wall every trail would show. Without motion vectors an object's edge may drag along the
+ * two pixels next to it, since jitter alone could have put them on its other side. */
 static void no_trail_behind_an_edge(void **state)
 {
     temporal_report r;
@@ -114,12 +116,14 @@ static void no_trail_behind_an_edge(void **state)
     assert_true(r.behind <= r.ahead);
     temporal_report_free(&r);
     run_on(&scene, false, 16, 4, &r);
-    print_message("no motion layer: 3 to 8 pixels behind %.5f, a sample %.5f\n", r.far_behind, r.far_behind_raw);
+    print_message("no motion layer: 3 to 8 pixels behind %.5f, a sample %.5f\n", r.far_behind,
+                  r.far_behind_raw);
     assert_true(r.far_behind <= r.far_behind_raw);
     temporal_report_free(&r);
 }
 
-/* ---- where history ends ------------------------------------------------------------------------------------------- */
+/* ---- where history ends
+ * ------------------------------------------------------------------------------------------- */
 
 typedef struct shot {
     temporal_session t;
@@ -149,7 +153,8 @@ static void end(shot *s)
     free(s->rgb[0]);
 }
 
-/* Frames in the middle pixel after one more frame; the camera is `x` metres to the right and turned by `turn`. */
+/* Frames in the middle pixel after one more frame; the camera is `x` metres to the right and turned by
+ * `turn`. */
 static int step(shot *s, long long number, double x, double turn)
 {
     double jitter[2] = {0, 0}, c = cos(turn), n = sin(turn);
@@ -240,12 +245,15 @@ static void fails_with(const char *taa, const char *text)
 static void unknown_materials_are_errors(void **state)
 {
     (void)state;
-    fails_with(", exclude: [sphare]", "pass 'aa' (taa): there is no material 'sphare'; did you mean 'sphere'?");
+    fails_with(", exclude: [sphare]",
+               "pass 'aa' (taa): there is no material 'sphare'; did you mean 'sphere'?");
     fails_with(", exclude: [7]", "pass 'aa' (taa): '7' has no material of its own");
-    fails_with(", exclude: [1.5]", "'exclude': expected materials: names, stencil names or ids, or a list of them");
+    fails_with(", exclude: [1.5]",
+               "'exclude': expected materials: names, stencil names or ids, or a list of them");
 }
 
-/* ---- the log ------------------------------------------------------------------------------------------------------ */
+/* ---- the log
+ * ------------------------------------------------------------------------------------------------------ */
 
 static void count_notes(void *ctx, rl_severity severity, rl_where where, const char *text)
 {

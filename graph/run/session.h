@@ -32,6 +32,7 @@ typedef struct rl_sequence {
     rl_frames frames; /* to be processed, in order */
     rl_active_light *lights;
     size_t n_lights;
+    bool march; /* one of them has `shadow: screen` */
     light_t *light_values; /* of the frame that runs */
     rl_light_planes shadow, thickness;
     const rl_materials *materials;

@@ -58,12 +58,8 @@ static rl_code no_such_shadow(const rl_manifest *m, const rl_light_spec *light, 
 static rl_code bind_shadow(const rl_session *s, const rl_manifest *m, rl_active_light *a, rl_error *err)
 {
     const rl_light_spec *light = a->spec;
-    if (light->shadow == RL_SHADOW_NONE)
+    if (light->shadow != RL_SHADOW_LAYER)
         return RL_OK;
-    if (light->shadow == RL_SHADOW_SCREEN)
-        return rl_fail(err, RL_E_CONFIG, light->where,
-                       "light '%s': 'shadow: screen' is not supported by this version; expected a layer's name or none",
-                       light->name);
     a->shadow = light_layer(m, "shadow", light->shadow_layer);
     a->thickness = light_layer(m, "shadow_thickness", light->shadow_layer);
     if (!a->shadow && light->shadow_named)
@@ -123,6 +119,7 @@ rl_code rl_session_lights(rl_session *s, rl_sequence *q, rl_error *err)
         rl_active_light *a = &q->lights[q->n_lights++];
         a->spec = spec;
         a->shadow_plane = a->thickness_plane = -1;
+        q->march |= spec->shadow == RL_SHADOW_SCREEN;
         code = bind_shadow(s, m, a, err);
         if (!code)
             code = light_color(s, spec, a->to_working, err);
@@ -147,7 +144,8 @@ void rl_session_light_values(const rl_sequence *q, const camera_t *camera, light
     for (size_t i = 0; i < q->n_lights; i++) {
         const rl_active_light *a = &q->lights[i];
         const rl_light_spec *spec = a->spec;
-        light_t l = {.shadow = a->shadow_plane, .shadow_thickness = a->thickness_plane};
+        light_t l = {.shadow = spec->shadow == RL_SHADOW_SCREEN ? SHADOW_MARCH : a->shadow_plane,
+                     .shadow_thickness = a->thickness_plane};
         l.type = spec->type == RL_LIGHT_POINT  ? LIGHT_POINT
                  : spec->type == RL_LIGHT_SPOT ? LIGHT_SPOT
                                                : LIGHT_DIRECTIONAL;
