@@ -34,6 +34,7 @@ RL_PARAMS_MATCH(lighting_params, 5);
 
 static const rl_param profile_keys[] = {
     RL_ROW_SCATTER_DISTANCE(.required_with = "transmission=thin|thick"),
+    RL_ROWS_SCATTER_PARAM,
     RL_ROW_TEXTURING,
     M_ENUM(transmission, "none|thin|thick|beer_lambert", 0, "light that comes through from the back face",
            .source = "Golubev 2018; Helix"),

@@ -3,6 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "graph/model/temperature.h"
 #include "graph/run/session.h"
 
 static const rl_light_spec *find_light(const rl_lights *lights, const char *name)
@@ -68,6 +69,32 @@ static rl_code bind_shadow(const rl_session *s, const rl_manifest *m, rl_active_
     return RL_OK;
 }
 
+/* The matrix of the light's colour space, with the colour of its temperature in it: factors for the channels of that
+ * space, which the working space tells from linear Rec.709. */
+static rl_code light_color(const rl_session *s, const rl_light_spec *spec, float m[9], rl_error *err)
+{
+    rl_code code = rl_session_light_matrix(s, spec->colorspace, spec->where, m, err);
+    if (code || !(spec->kelvin > 0))
+        return code;
+    float rec709[9];
+    double to_working[9], from_working[9], to_rec709[9] = {0}, factor[3];
+    code = rl_session_light_matrix(s, "lin_rec709", spec->where, rec709, err);
+    if (code)
+        return code;
+    for (int i = 0; i < 9; i++)
+        to_working[i] = (double)rec709[i];
+    if (!rl_invert3(to_working, from_working))
+        return rl_fail(err, RL_E_CONFIG, spec->where,
+                       "light '%s' has a temperature, whose colour the working space cannot tell apart", spec->name);
+    for (int i = 0; i < 9; i++)
+        for (int k = 0; k < 3; k++)
+            to_rec709[i] += from_working[i / 3 * 3 + k] * (double)m[3 * k + i % 3];
+    rl_kelvin_rgb(spec->kelvin, spec->duv, to_rec709, factor);
+    for (int i = 0; i < 9; i++)
+        m[i] = (float)((double)m[i] * factor[i % 3]);
+    return RL_OK;
+}
+
 rl_code rl_session_lights(rl_session *s, rl_sequence *q, rl_error *err)
 {
     const rl_manifest *m = q->manifest;
@@ -95,7 +122,7 @@ rl_code rl_session_lights(rl_session *s, rl_sequence *q, rl_error *err)
         q->march |= spec->shadow == RL_SHADOW_SCREEN;
         code = bind_shadow(s, m, a, err);
         if (!code)
-            code = rl_session_light_matrix(s, spec->colorspace, spec->where, a->to_working, err);
+            code = light_color(s, spec, a->to_working, err);
         if (a->shadow)
             shadow[a->shadow_plane = q->shadow.n++] = a->shadow;
         if (a->thickness)
