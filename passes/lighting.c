@@ -18,12 +18,12 @@ typedef struct lighting_params {
 
 static const rl_param params[] = {
     P(lighting_params, RL_I32, shadow_steps, 1, 16384, 128, "steps",
-      "lights with shadow: screen: most places on the way to the light that are looked at; ways of up to so many pixels "
-      "miss nothing that the camera sees. Occluders out of its sight, or outside of the image or crop, cast no shadow, "
-      "back faces are not shadowed, and the shadow's thickness is unknown",
+      "shadow: screen: most places on the way to the light that are looked at; ways of up to so many pixels miss nothing "
+      "in sight, but what the camera does not see, or lies outside of the image or crop, casts no shadow",
       .source = "McGuire and Mara 2014"),
     P(lighting_params, RL_F32, shadow_thickness_m, 0, 1e6, 0.05, "m",
-      "shadow: screen: how deep occluders are taken to be, along the view axis; rays that pass farther behind are free"),
+      "shadow: screen: how deep occluders are taken to be, along the view axis; rays farther behind are free; transmission: "
+      "its light from behind has neither shadow nor shadow_thickness"),
     P(lighting_params, RL_F32, shadow_bias_m, 0, 1e3, 0.0005, "m",
       "shadow: screen: how far behind the surface a ray must be to be blocked; raise it for depth in half precision"),
     P(lighting_params, RL_BOOL, shadow_jitter, 0, 1, 1, "",
