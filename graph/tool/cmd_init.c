@@ -67,6 +67,14 @@ static void add_light(rl_str *out, const rl_light_spec *l)
         rl_str_add(out, ", efficacy: ");
         add_number(out, l->efficacy);
     }
+    if (l->kelvin > 0) {
+        rl_str_add(out, ", temperature: ");
+        add_number(out, l->kelvin);
+    }
+    if (l->duv != 0) {
+        rl_str_add(out, ", tint: ");
+        add_number(out, l->duv);
+    }
     if (strcmp(l->colorspace, "lin_rec709")) {
         rl_str_add(out, ", colorspace: ");
         add_text(out, l->colorspace);
@@ -89,14 +97,15 @@ static void add_lights(rl_str *out, const rl_manifest *m)
     if (m->lights.n) {
         rl_str_add(out,
                    "\n# The capture's own lights are used, as they were recorded. Uncomment to re-light:\n"
-                   "# intensity in W/sr, positions in metres, shadow: a layer or none.\n"
+                   "# intensity in W/sr, positions in metres, shadow: a layer, screen (found in the depth buffer, slower) or none.\n"
                    "#lights:\n");
         for (size_t i = 0; i < m->lights.n; i++)
             add_light(out, &m->lights.light[i]);
         return;
     }
     rl_str_add(out,
-               "\n# The capture has no lights. One to begin with, beside the camera: intensity in W/sr.\n"
+               "\n# The capture has no lights. One to begin with, beside the camera: intensity in W/sr. With shadow: screen\n"
+               "# its shadows are found in the depth buffer, which takes longer (relit passes lighting).\n"
                "lights:\n"
                "  key: {type: point, space: camera, position: [-0.5, 0.5, 0], intensity: 2, shadow: none}\n");
 }
