@@ -214,7 +214,7 @@ static void compare_band(void *ctx, int band)
     int last = end + RL_FILTER_RADIUS < f->height ? end + RL_FILTER_RADIUS : f->height;
     size_t n = (size_t)rl_filter_width(f->width), one = (size_t)(last - first) * N_ACROSS * n;
     size_t count = 2 * one + 2 * N_DOWN * n + n + 2 * RL_FILTER_RADIUS;
-    double *scratch = rl_aligned(count * sizeof *scratch);
+    double *scratch = rl_malloc(count * sizeof *scratch);
     filtered rows;
     if (!scratch) {
         atomic_store(&f->failed, true);
