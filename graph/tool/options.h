@@ -44,7 +44,7 @@ typedef struct rl_arguments {
     const char *trace;      /* or NULL */
     int size[2];            /* bench: width, height; 0 = the capture's */
     int on_missing, format; /* words, as indices of rl_on_missing and rl_plan_word */
-    bool json, quiet, verbose, help;
+    bool json, markdown, quiet, verbose, help;
 } rl_arguments;
 
 /* Reads the words behind the command's name. An error is RL_E_USAGE and names the nearest option. */
