@@ -7,6 +7,7 @@
 #   make fuzz        changed inputs against parsers and readers, FUZZ_SECONDS=60 each
 #   make soak        2,000 frames: memory flat, nothing leaked
 #   make bench       kernels and codecs against their peers
+#   make temporal    CAPTURES="folders": temporal anti-aliasing against the truth, and its flicker: tables and strips
 #   make accuracy    TRUTH=folder: every model against a path-traced truth (tests/accuracy.c)
 #   make install     PREFIX=/usr/local: program, library, headers, relit.pc, configs, kernels
 #   make deps        Debian packages
@@ -190,6 +191,9 @@ deps:
 	fi
 
 # Pictures of the error go to OUT.
+temporal: all $(BUILD)/tests/temporal
+	@$(BUILD)/tests/temporal $(CAPTURES)
+
 OUT ?= out/accuracy
 accuracy: all $(BUILD)/tests/accuracy
 	@test -n "$(TRUTH)" || { echo "give TRUTH=folder, as tests/accuracy_scene.h describes it" >&2; exit 2; }
@@ -221,4 +225,4 @@ layers:
 clean:
 	rm -rf $(BUILD) build-asan
 
-.PHONY: all demo bench test test-build test-asan deps install format format-check layers clean fuzz accuracy soak slurm-test
+.PHONY: all demo bench test test-build test-asan deps install format format-check layers clean fuzz accuracy soak slurm-test temporal

@@ -190,7 +190,8 @@ typedef struct rl_frame_data {
     double jitter[2];           /* pixels; used when the manifest says `jitter: header` */
 } rl_frame_data;
 
-/* Runs the graph on one frame; frames of a sequence must come in order (history). Nothing is written: read
+/* Runs the graph on one frame; frames of a sequence must come in order: history ends at a gap of the numbers, at a `cuts:`
+ * of the manifest, at a jump of the camera, when the size changes, and after a frame that failed. Nothing is written: read
  * the images. With data NULL the frame is read from the session's capture. */
 rl_code rl_session_process(rl_session *session, size_t capture, long long frame, const rl_frame_data *data,
                            rl_error *err);

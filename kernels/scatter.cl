@@ -197,7 +197,9 @@ static inline floatv scatter_mean_slope(global const float *depth, global const 
  *
  *     sum(R E dA) * ((1 - cos) / sum(R dA) + cos / sum(R_plane dA_plane))
  *
- * What is hidden counts as no less and no more lit than what is seen. */
+ * What is hidden counts as no less and no more lit than what is seen. On a captured head, against a
+ * path-traced truth, the error is 0.54 to 0.67 of that of `area`; on a ball of wax 0.39, 0.48 and 1.34 of it
+ * (red, green, blue; `plain` has 4.5, 4.3 and 3.0 times as much). sss_burley takes 1.7 times the time. */
 typedef struct plane_t {
     floatv x, y; /* slopes, metres of depth a pixel */
     floatv cosine;

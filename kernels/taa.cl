@@ -5,15 +5,17 @@
 #define DEPTH_TOLERANCE 0.02f          /* of the depth: what is nearer or farther is something else */
 #define SNAP            (1.0f / 1024)  /* pixels: displacements this close to a whole number are taken as whole */
 #define SLIDES          0.25f          /* pixels a frame: an edge that moves faster over what is behind it leaves it behind */
+#define MOST            5              /* of 9: a half plane that covers the middle leaves at most 4 */
 #define EDGE_FRAMES     4.0f           /* what history is worth at a moving edge: that of what turns is not where its surface was */
 #define COUNT_MAX       65536.0f       /* a frame's weight in a plain mean never gets below 1/COUNT_MAX */
-#define STILL           2.0f           /* the box is this much wider where nothing moves: jitter alone scatters colours */
+#define STILL           3.0f           /* the box is this much wider where nothing moves: jitter alone scatters colours */
 
 /* ---- where it was ---------------------------------------------------------------------------------------------- */
 
 typedef struct place_t {
     floatv dx, dy; /* displacement, pixels */
     floatv then;   /* depth that the pixel's own surface had, if only the camera moved */
+    floatv low, high; /* … and the least and largest of its material in 3x3 */
     intv alone;    /* nothing but the pixel's own surface in 3x3 */
     intv edge;     /* another depth in 3x3 */
     intv behind;   /* a closer surface in 3x3 */
@@ -37,7 +39,7 @@ static inline void find_place(constant frame_t *f, global const float *depth, gl
     floatv own = far_if_empty(rl_load(depth, rl_index(f, x, y))), best = own, last = own, ox = 0.0f, oy = 0.0f;
     floatv near_dx = 0.0f, near_dy = 0.0f;
     p->alone = (intv)-1;
-    p->then = own;
+    p->low = p->high = own;
     p->dx = p->dy = 0.0f;
 #if HAS_motion
     near_dx = p->dx = tap(motion, f, x, y);
@@ -52,7 +54,10 @@ static inline void find_place(constant frame_t *f, global const float *depth, gl
         best = fmin(best, z);
         last = fmax(last, z);
 #if HAS_stencil
-        p->alone &= rl_load_id_edge(stencil, f, nx, ny) == id;
+        intv mine = rl_load_id_edge(stencil, f, nx, ny) == id;
+        p->alone &= mine;
+        p->low = rl_select(p->low, fmin(p->low, z), mine);
+        p->high = rl_select(p->high, fmax(p->high, z), mine);
 #endif
 #if HAS_motion
         near_dx = rl_select(near_dx, tap(motion, f, nx, ny), closer);
@@ -70,6 +75,8 @@ static inline void find_place(constant frame_t *f, global const float *depth, gl
     if (moved)
         follow(f, m, px, py, own, &own_dx, &own_dy, &ratio);
     p->then = rl_select(FAR, own * ratio, own < FAR);
+    p->low *= ratio;
+    p->high *= ratio;
 #if HAS_motion
     own_dx = p->dx;
     own_dy = p->dy;
@@ -106,28 +113,34 @@ static inline intv nearest_same(constant frame_t *f, const history_t *h, uintv i
     return same;
 }
 
-/* Lanes of `mask` whose surface was at the place. Where a pixel is alone now no edge goes through it, and the nearest
- * history pixel must be of its surface. Elsewhere that is a matter of jitter: the surface must be among those of the 3x3
- * history pixels, of the same material and at a depth between the least and the largest that it has there. */
+/* Lanes of `mask` whose surface was at the place. Where a pixel is alone now no straight edge goes through it, and the
+ * nearest history pixel must be of its surface, or most of 3x3: what was there then is smaller than a pixel, and this
+ * frame's jitter has missed it. Elsewhere, at edges, it is a matter of jitter anyway: the depths of its
+ * material in 3x3 now and in 3x3 around each pixel between which the place lies must overlap. (Ranges, since towards its outline a surface falls off within a pixel.) */
 static inline intv same_surface(constant frame_t *f, const history_t *h, uintv id, const place_t *p, intv mask, int x, int y,
                                 intv right, intv below, int whole)
 {
+    intv across = p->dx != floor(p->dx), down = p->dy != floor(p->dy);
     floatv low = 2 * FAR, high = 0.0f, z = p->then;
-    intv same = p->alone & nearest_same(f, h, id, z, x, y, right, below, whole);
-    if (!rl_any(mask & ~p->alone))
+    intv most = 0, same = p->alone & nearest_same(f, h, id, z, x, y, right, below, whole);
+    if (!rl_any(mask & ~same))
         return same;
     for (int j = -1; j < 3 - whole; j++) {
         for (int i = -1; i < 3 - whole; i++) {
-            intv use = (i == -1 ? ~right : i == 2 ? right : (intv)-1) & (j == -1 ? ~below : j == 2 ? below : (intv)-1);
+            intv near = (i == -1 ? ~right : i == 2 ? right : (intv)-1) & (j == -1 ? ~below : j == 2 ? below : (intv)-1);
+            intv use = (i == 2 ? across : (intv)-1) & (j == 2 ? down : (intv)-1);
 #if HAS_stencil
             use &= rl_load_id_edge(h->stencil, f, x + i, y + j) == id;
 #endif
             floatv t = far_if_empty(tap(h->depth, f, x + i, y + j));
             low = rl_select(low, fmin(low, t), use);
             high = rl_select(high, fmax(high, t), use);
+            most -= use & near & (fabs(t - z) <= 2 * DEPTH_TOLERANCE * z);
         }
     }
-    return same | (~p->alone & (z >= low * (1.0f - DEPTH_TOLERANCE)) & (z <= high * (1.0f + DEPTH_TOLERANCE)));
+    same |= p->alone & (most >= MOST);
+    return same |
+           (~p->alone & (p->high >= low * (1.0f - DEPTH_TOLERANCE)) & (p->low <= high * (1.0f + DEPTH_TOLERANCE)));
 }
 
 /* The count is negative where a pixel followed the edge of another surface: what is there is not of its own surface's past,

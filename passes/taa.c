@@ -14,7 +14,7 @@ typedef struct taa_params {
 static const rl_param params[] = {
     P(taa_params, RL_F32, blend, 0, 1, 0.05, "ratio", "least weight of the current frame"),
     P(taa_params, RL_F32, clip_gamma, 0, 8, 1, "stddev",
-      "half width of the colour box that the history is clipped to; doubled where nothing moves",
+      "half width of the colour box that the history is clipped to; tripled where nothing moves",
       .source = "Salvi 2016"),
     P_MATERIALS(taa_params, exclude, "what is not accumulated: always the current frame"),
 };
@@ -32,7 +32,8 @@ static const rl_port ports[] = {
     {"last_stencil", RL_HISTORY, RL_ID, .of = "stencil", .help = "the previous materials", .optional = true},
     {"last_count", RL_HISTORY, RL_SCALAR, .of = "count", .help = "frames in the previous result"},
     {"color", RL_WRITE, RL_RGB, .help = "anti-aliased, scene-linear"},
-    {"count", RL_WRITE, RL_SCALAR, .help = "frames that the pixel consists of, this one included; negative where it follows an edge before it"},
+    {"count", RL_WRITE, RL_SCALAR,
+     .help = "frames in the pixel, this one included; negative: it follows an edge in front"},
 };
 
 static const rl_step steps[] = {{"taa", .domain = RL_EVERY_VECTOR}};
@@ -53,6 +54,8 @@ const rl_pass rl_pass_taa = {
     .ports = RL_ARRAY(ports),
     .steps = RL_ARRAY(steps),
     .least_share = least_share,
-    .fades_where = "where history is neither clipped, nor resampled, nor a firefly; elsewhere it lies in the colour box of "
-                   "the pixel's 3x3 neighbours whatever came before, so that no two runs differ by more than that box",
+    .fades_where =
+        "where history is neither clipped, nor resampled, nor a firefly; elsewhere it lies in the colour box "
+        "of "
+        "the pixel's 3x3 neighbours whatever came before, so that no two runs differ by more than that box",
 };

@@ -4,9 +4,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* ---- frames ------------------------------------------------------------------------------------------------------- */
+/* ---- frames
+ * ------------------------------------------------------------------------------------------------------- */
 
-static rl_code keep(rl_session *s, const char *name, temporal_images *m, float **planes, int *n, rl_error *err)
+static rl_code keep(rl_session *s, const char *name, temporal_images *m, float **planes, int *n,
+                    rl_error *err)
 {
     rl_image_view v;
     rl_code code = rl_session_image(s, name, &v, err);
@@ -76,7 +78,8 @@ void temporal_images_free(temporal_images *m)
     memset(m, 0, sizeof *m);
 }
 
-/* ---- flicker ------------------------------------------------------------------------------------------------------ */
+/* ---- flicker
+ * ------------------------------------------------------------------------------------------------------ */
 
 static double luminance(const temporal_images *m, float *const rgb[3], double x, double y, bool nearest)
 {
@@ -97,7 +100,8 @@ static double luminance(const temporal_images *m, float *const rgb[3], double x,
 
 #define MOST_CHANGE 1.05 /* of the light, over the whole span */
 
-/* Whether the 5x5 pixels around (x, y) of frame i show what pixel `like` of frame `of` shows, lit by the same lights. */
+/* Whether the 5x5 pixels around (x, y) of frame i show what pixel `like` of frame `of` shows, lit by the same
+ * lights. */
 static bool is_same(const temporal_images *m, int i, double x, double y, int of, size_t like)
 {
     int left = (int)floor(x) - 2, top = (int)floor(y) - 2;
@@ -119,7 +123,8 @@ static double light_at(const temporal_images *m, int i, double x, double y)
 {
     double sum = 0;
     for (int k = 0; k < 25; k++) {
-        size_t at = (size_t)(floor(y + 0.5) + k / 5 - 2) * (size_t)m->width + (size_t)(floor(x + 0.5) + k % 5 - 2);
+        size_t at =
+            (size_t)(floor(y + 0.5) + k / 5 - 2) * (size_t)m->width + (size_t)(floor(x + 0.5) + k % 5 - 2);
         sum += (double)m->diffuse[i][1][at] + (double)m->lit[i][1][at];
     }
     return sum / 25;

@@ -1,5 +1,5 @@
-/* How much a recorded sequence flickers, with and without temporal anti-aliasing: the deviation in time along the true
- * motion. */
+/* How much a recorded sequence flickers, with and without temporal anti-aliasing: the deviation in time along
+ * the true motion. */
 #ifndef RL_TESTS_TEMPORAL_CAPTURE_H
 #define RL_TESTS_TEMPORAL_CAPTURE_H
 
@@ -23,12 +23,14 @@ void temporal_images_free(temporal_images *images);
 
 typedef struct temporal_flicker {
     long pixels;
-    double raw, done; /* root mean square over the pixels of the deviation in time of the luminance, / its mean */
+    double raw,
+        done; /* root mean square over the pixels of the deviation in time of the luminance, / its mean */
 } temporal_flicker;
 
-/* Over pixels of the last frame that show one material for all of the last TEMPORAL_SPAN frames, in 5x5, in shadow of
- * the same lights and under light that changes by at most 5 %; a linear change in time is no flicker. Where a path leads between pixels the image is interpolated
- * linearly, or with `nearest` not at all. */
+/* Over pixels of the last frame that show one material for all of the last TEMPORAL_SPAN frames, in 5x5, in
+ * shadow of the same lights and under light that changes by at most 5 %; a linear change in time is no
+ * flicker. Where a path leads between pixels the image is interpolated linearly, or with `nearest` not at
+ * all. */
 temporal_flicker temporal_measure_flicker(const temporal_images *images, bool nearest);
 
 #endif

@@ -5,30 +5,31 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const char pipeline[] =
-    "relit: 1\n"
-    "capture:\n"
-    "  relit_capture: 1\n"
-    "  name: made\n"
-    "  files: memory\n"
-    "  frames: 1-999\n"
-    "  unit: m\n"
-    "%s"
-    "  camera: {matrix: header, forward: -z, fov_x: header, jitter: header}\n"
-    "  stencil_names: {1: plane, 2: sphere}\n"
-    "  layers:\n"
-    "    albedo: {channels: [R, G, B], colorspace: lin_rec709}\n"
-    "    normal: {channels: [NX, NY, NZ], space: world, encoding: signed}\n"
-    "    depth: {channels: [Z], kind: planar, empty: 1e10}\n"
-    "    stencil: {channels: [ID]}\n"
-    "%s"
-    "materials: {plane: {}, sphere: {}}\n"
-    "graph: {aa: {pass: taa, in: {color: capture.albedo}%s}}\n"
-    "outputs: {o: {layers: {c: aa.color, n: aa.count}, file: 'o.{frame}.exr'}}\n";
+static const char pipeline[] = "relit: 1\n"
+                               "capture:\n"
+                               "  relit_capture: 1\n"
+                               "  name: made\n"
+                               "  files: memory\n"
+                               "  frames: 1-999\n"
+                               "  unit: m\n"
+                               "%s"
+                               "  camera: {matrix: header, forward: -z, fov_x: header, jitter: header}\n"
+                               "  stencil_names: {1: plane, 2: sphere}\n"
+                               "  layers:\n"
+                               "    albedo: {channels: [R, G, B], colorspace: lin_rec709}\n"
+                               "    normal: {channels: [NX, NY, NZ], space: world, encoding: signed}\n"
+                               "    depth: {channels: [Z], kind: planar, empty: 1e10}\n"
+                               "    stencil: {channels: [ID]}\n"
+                               "%s"
+                               "materials: {plane: {}, sphere: {}}\n"
+                               "graph: {aa: {pass: taa, in: {color: capture.albedo}%s}}\n"
+                               "outputs: {o: {layers: {c: aa.color, n: aa.count}, file: 'o.{frame}.exr'}}\n";
 
-bool temporal_open(temporal_session *t, bool with_motion, const char *taa, const char *more, const rl_log *log)
+bool temporal_open(temporal_session *t, bool with_motion, const char *taa, const char *more,
+                   const rl_log *log)
 {
-    static const char motion[] = "    motion: {channels: [MX, MY], unit: pixels, points: previous, y: down}\n";
+    static const char motion[] =
+        "    motion: {channels: [MX, MY], unit: pixels, points: previous, y: down}\n";
     memset(t, 0, sizeof *t);
     snprintf(t->text, sizeof t->text, pipeline, more ? more : "", with_motion ? motion : "", taa);
     rl_options options = {.pipeline_text = t->text, .log = log};
@@ -49,15 +50,21 @@ static void copy_plane(const rl_image_view *v, int plane, float *out)
                (size_t)v->width * sizeof *out);
 }
 
-bool temporal_step(temporal_session *t, long long number, const temporal_frame *f, float *const rgb[3], float *count)
+bool temporal_step(temporal_session *t, long long number, const temporal_frame *f, float *const rgb[3],
+                   float *count)
 {
     size_t w = (size_t)f->width;
     rl_channel_data channels[] = {
-        {.name = "R", .floats = f->color[0], .stride = w},   {.name = "G", .floats = f->color[1], .stride = w},
-        {.name = "B", .floats = f->color[2], .stride = w},   {.name = "NX", .floats = f->normal[0], .stride = w},
-        {.name = "NY", .floats = f->normal[1], .stride = w}, {.name = "NZ", .floats = f->normal[2], .stride = w},
-        {.name = "Z", .floats = f->depth, .stride = w},      {.name = "ID", .ids = f->id, .stride = w},
-        {.name = "MX", .floats = f->motion[0], .stride = w}, {.name = "MY", .floats = f->motion[1], .stride = w},
+        {.name = "R", .floats = f->color[0], .stride = w},
+        {.name = "G", .floats = f->color[1], .stride = w},
+        {.name = "B", .floats = f->color[2], .stride = w},
+        {.name = "NX", .floats = f->normal[0], .stride = w},
+        {.name = "NY", .floats = f->normal[1], .stride = w},
+        {.name = "NZ", .floats = f->normal[2], .stride = w},
+        {.name = "Z", .floats = f->depth, .stride = w},
+        {.name = "ID", .ids = f->id, .stride = w},
+        {.name = "MX", .floats = f->motion[0], .stride = w},
+        {.name = "MY", .floats = f->motion[1], .stride = w},
     };
     rl_frame_data data = {.width = f->width,
                           .height = f->height,
@@ -80,7 +87,8 @@ bool temporal_step(temporal_session *t, long long number, const temporal_frame *
     return true;
 }
 
-/* ---- errors ------------------------------------------------------------------------------------------------------- */
+/* ---- errors
+ * ------------------------------------------------------------------------------------------------------- */
 
 double temporal_psnr(const temporal_frame *shape, float *const rgb[3], float *const truth[3])
 {
@@ -98,7 +106,8 @@ static int ascending(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-double temporal_percentile(const temporal_frame *shape, float *const rgb[3], float *const truth[3], double share)
+double temporal_percentile(const temporal_frame *shape, float *const rgb[3], float *const truth[3],
+                           double share)
 {
     size_t n = (size_t)shape->width * (size_t)shape->height;
     float *errors = malloc(3 * n * sizeof *errors);
@@ -113,7 +122,8 @@ double temporal_percentile(const temporal_frame *shape, float *const rgb[3], flo
     return e;
 }
 
-/* ---- whole sequences ---------------------------------------------------------------------------------------------- */
+/* ---- whole sequences
+ * ---------------------------------------------------------------------------------------------- */
 
 void temporal_report_free(temporal_report *r)
 {
@@ -173,8 +183,8 @@ static void look_at_disoccluded(const temporal_scene *s, int number, temporal_re
 }
 
 typedef struct trail {
-    double behind, ahead, raw;
-    long n_behind, n_ahead;
+    double behind, ahead, far, far_raw; /* sums */
+    long n_behind, n_ahead, n_far;
 } trail;
 
 static void look_beside_sphere(const temporal_scene *s, int number, const temporal_report *r, trail *t)
@@ -190,8 +200,12 @@ static void look_beside_sphere(const temporal_scene *s, int number, const tempor
                 t->n_ahead++;
             } else {
                 t->behind += error_at(r->result, r->truth, i);
-                t->raw += error_at(r->frame.color, r->truth, i);
                 t->n_behind++;
+            }
+            if (d < -3) {
+                t->far += error_at(r->result, r->truth, i);
+                t->far_raw += error_at(r->frame.color, r->truth, i);
+                t->n_far++;
             }
         }
     }
@@ -223,7 +237,8 @@ bool temporal_sequence(temporal_session *t, const temporal_scene *scene, int fra
     r->raw_psnr = -10 * log10(raw);
     r->psnr = -10 * log10(done);
     r->behind = beside.behind / fmax((double)beside.n_behind, 1);
-    r->behind_raw = beside.raw / fmax((double)beside.n_behind, 1);
+    r->far_behind = beside.far / fmax((double)beside.n_far, 1);
+    r->far_behind_raw = beside.far_raw / fmax((double)beside.n_far, 1);
     r->ahead = beside.ahead / fmax((double)beside.n_ahead, 1);
     return true;
 }

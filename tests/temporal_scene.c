@@ -10,11 +10,12 @@ static const double plane_point[3] = {0, 0, -2}, plane_normal[3] = {0.228748, 0.
 static const double radius = 0.16;
 static const double texel = 0.0076; /* metres of the plane that a pixel shows when the image is 192 wide */
 
-/* ---- where things are ------------------------------------------------------------------------------------------ */
+/* ---- where things are
+ * ------------------------------------------------------------------------------------------ */
 
 typedef struct pose {
-    double eye[3], turn;     /* of the camera; turn about the y axis, radians */
-    double centre[3], spin;  /* of the sphere */
+    double eye[3], turn;    /* of the camera; turn about the y axis, radians */
+    double centre[3], spin; /* of the sphere */
 } pose;
 
 static pose pose_at(const temporal_scene *s, int number)
@@ -54,7 +55,8 @@ static void project(const temporal_scene *s, const pose *p, const double *world,
     *y = 0.5 * s->height - focal(s) * v[1] / -v[2];
 }
 
-/* ---- what a ray meets ------------------------------------------------------------------------------------------- */
+/* ---- what a ray meets
+ * ------------------------------------------------------------------------------------------- */
 
 typedef struct hit {
     uint32_t id;
@@ -117,14 +119,16 @@ static void point_then(const pose *then, const hit *h, double *world)
         world[i] = then->centre[i] + radius * n[i];
 }
 
-/* ---- colours ---------------------------------------------------------------------------------------------------- */
+/* ---- colours
+ * ---------------------------------------------------------------------------------------------------- */
 
-/* A texture with detail from 23 to 4 pixels, hard edges and thin dark lines; u, v in pixels. Between 0.05 and 0.95. */
+/* A texture with detail from 23 to 4 pixels, hard edges and thin dark lines; u, v in pixels. Between 0.05 and
+ * 0.95. */
 static double texture(double u, double v, int channel)
 {
     double p = 0.7 * channel;
-    double t = 0.5 + 0.12 * sin(2 * PI * u / 23 + p) * cos(2 * PI * v / 17) + 0.08 * sin(2 * PI * (u + v) / 9.1 + p) +
-               0.05 * sin(2 * PI * (0.8 * u - 1.1 * v) / 4.3 + p);
+    double t = 0.5 + 0.12 * sin(2 * PI * u / 23 + p) * cos(2 * PI * v / 17) +
+               0.08 * sin(2 * PI * (u + v) / 9.1 + p) + 0.05 * sin(2 * PI * (0.8 * u - 1.1 * v) / 4.3 + p);
     bool tile = fmod(floor(u / 28) + floor(v / 22), 2) == 0;
     bool line = fabs(fmod(u + 0.4 * v, 31)) < 1.5;
     return t + (tile ? 0.06 : -0.06) - (line ? 0.08 : 0);
@@ -141,11 +145,13 @@ static void shade(const temporal_scene *s, const hit *h, double *rgb)
         if (h->id == SCENE_PLANE && s->plain)
             rgb[c] = 0.2 + 0.0004 * (u + 100) + 0.03 * c;
         else
-            rgb[c] = texture(u, v, h->id == SCENE_SPHERE ? 2 - c : c) + (h->id == SCENE_SPHERE ? 0.08 : -0.05);
+            rgb[c] =
+                texture(u, v, h->id == SCENE_SPHERE ? 2 - c : c) + (h->id == SCENE_SPHERE ? 0.08 : -0.05);
     }
 }
 
-/* ---- frames ------------------------------------------------------------------------------------------------------ */
+/* ---- frames
+ * ------------------------------------------------------------------------------------------------------ */
 
 bool temporal_frame_new(temporal_frame *f, int width, int height)
 {

@@ -1,5 +1,6 @@
-/* A scene whose box-filtered picture is known: a textured plane, tilted, and a textured sphere in front of it, seen by a
- * pinhole camera. Point samples as a rasterizer would record them, the truth by supersampling, all in double. */
+/* A scene whose box-filtered picture is known: a textured plane, tilted, and a textured sphere in front of
+ * it, seen by a pinhole camera. Point samples as a rasterizer would record them, the truth by supersampling,
+ * all in double. */
 #ifndef RL_TESTS_TEMPORAL_SCENE_H
 #define RL_TESTS_TEMPORAL_SCENE_H
 
@@ -39,12 +40,12 @@ void temporal_render(const temporal_scene *s, int number, const double jitter[2]
 /* The mean colour of n * n samples over each pixel's square; three planes. */
 void temporal_truth(const temporal_scene *s, int number, int n, float *const rgb[3]);
 
-/* What is seen of pixel (x, y) of frame `number` was hidden or outside of the image one frame before, and so was all that
- * lies less than `reach` pixels from it there. */
+/* What is seen of pixel (x, y) of frame `number` was hidden or outside of the image one frame before, and so
+ * was all that lies less than `reach` pixels from it there. */
 bool temporal_disoccluded(const temporal_scene *s, int number, int x, int y, double reach);
 
-/* Signed distance in pixels from the pixel's centre to the sphere's outline along the row: > 0 right of it, < 0 left of it,
- * 0 in it or where the row misses it. */
+/* Signed distance in pixels from the pixel's centre to the sphere's outline along the row: > 0 right of it, <
+ * 0 left of it, 0 in it or where the row misses it. */
 double temporal_beside_sphere(const temporal_scene *s, int number, int x, int y);
 
 #endif

@@ -249,6 +249,55 @@ static void test_identity(void **state)
     free(data);
 }
 
+/* Frames that are held (one missing, one broken) end history in a resumed run as they do in one run, and are
+ * held from the same frame; a skipped one is not missed. */
+static void test_held(void **state)
+{
+    (void)state;
+    size_t size;
+    char *data = file_read("captures/monkey_turn/monkey_turn.0011.exr", &size);
+    char *sixth = path_in(place.capture, "loop.0006.exr"),
+         *eleventh = path_in(place.capture, "loop.0011.exr");
+    assert_int_equal(unlink(sixth) | unlink(eleventh), 0);
+    file_write(place.capture, "loop.0011.exr", data, size / 2);
+    const char *gone[] = {"loop.0006.exr", "loop.0007.exr", "loop.0011.exr", "loop.0014.exr"};
+    tool_result r = BATCH(&place, "held", 0, "--quiet", "--on-missing", "hold", "--frames", "1-16");
+    tool_result_free(&r);
+    r = BATCH(&place, "held too", 0, "--quiet", "--on-missing", "hold", "--frames", "1-16");
+    tool_result_free(&r);
+    for (int i = 0; i < 4; i++)
+        drop("held too", gone[i]);
+    r = BATCH(&place, "held too", 0, "--resume", "--on-missing", "hold", "--frames", "1-16");
+    assert_non_null(strstr(r.err, "frame 6 holds the layers of frame 5"));
+    assert_non_null(strstr(r.err, "frame 11 holds the layers of frame 10"));
+    tool_result_free(&r);
+    batch_assert_same(&place, "held", "held too");
+    /* Exact shards, of which the second begins behind a frame that is held. */
+    for (int i = 1; i <= 3; i++) {
+        char which[8];
+        snprintf(which, sizeof which, "%d/3", i); /* 1-6, 7-11, 12-17 */
+        r = BATCH(&place, "held parts", 0, "--quiet", "--on-missing", "hold", "--frames", "1-17", "--shard",
+                  which);
+        tool_result_free(&r);
+    }
+    r = BATCH(&place, "held all", 0, "--quiet", "--on-missing", "hold", "--frames", "1-17");
+    tool_result_free(&r);
+    batch_assert_same(&place, "held all", "held parts");
+    r = BATCH(&place, "skipped", 0, "--quiet", "--on-missing", "skip", "--frames", "1-8");
+    tool_result_free(&r);
+    r = BATCH(&place, "skipped", 0, "--resume", "--json", "--on-missing", "skip", "--frames", "1-8");
+    assert_string_equal(r.out, "");
+    tool_result_free(&r);
+    char target[4096];
+    assert_non_null(realpath("captures/monkey_turn/monkey_turn.0006.exr", target));
+    assert_int_equal(symlink(target, sixth), 0);
+    assert_non_null(realpath("captures/monkey_turn/monkey_turn.0011.exr", target));
+    assert_int_equal(unlink(eleventh) | symlink(target, eleventh), 0);
+    free(data);
+    free(sixth);
+    free(eleventh);
+}
+
 /* ---- checkpoints -----------------------------------------------------------------------------------------
  */
 
@@ -320,7 +369,7 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_kill),       cmocka_unit_test(test_stop),     cmocka_unit_test(test_missing),
         cmocka_unit_test(test_no_history), cmocka_unit_test(test_identity), cmocka_unit_test(test_damaged),
-        cmocka_unit_test(test_refused),
+        cmocka_unit_test(test_refused),    cmocka_unit_test(test_held),
     };
     return cmocka_run_group_tests_name("resume", tests, setup, teardown);
 }

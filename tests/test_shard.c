@@ -247,6 +247,15 @@ static void test_warm_up(void **state)
         }
         free(p);
     }
+    /* A warmed-up shard that lost a picture gets the same one back. */
+    r = BATCH(&place, "warm too", 0, STILL, "--shard", "2/2", "--preroll", "2");
+    tool_result_free(&r);
+    char *lost = path_in(place.folder, "warm too/monkey.0007.exr");
+    assert_int_equal(remove(lost), 0);
+    r = BATCH(&place, "warm too", 0, STILL, "--shard", "2/2", "--preroll", "2", "--resume");
+    tool_result_free(&r);
+    batch_assert_same(&place, "warm", "warm too");
+    free(lost);
     for (int i = 5; i <= 8; i++) {
         char name[64];
         snprintf(name, sizeof name, "monkey.%04d.exr", i);

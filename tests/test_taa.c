@@ -84,7 +84,8 @@ static void random_pixel(taa_case *t, int x, int y, uint64_t *seed)
     *at(t, TAA_LAST_DEPTH, 0, x, y) = (float)(z * (0.9 + 0.2 * shade_random(seed)));
     shade_set_id(&t->images[TAA_STENCIL], &t->run.frame, x, y, id);
     shade_set_id(&t->images[TAA_LAST_STENCIL], &t->run.frame, x, y, shade_random(seed) < 0.6 ? id : 2);
-    *at(t, TAA_LAST_COUNT, 0, x, y) = (float)(floor(1 + 30 * shade_random(seed)) * (shade_random(seed) < 0.1 ? -1 : 1));
+    *at(t, TAA_LAST_COUNT, 0, x, y) =
+        (float)(floor(1 + 30 * shade_random(seed)) * (shade_random(seed) < 0.1 ? -1 : 1));
     for (int c = 0; c < 3; c++) {
         double bright = shade_random(seed) < 0.02 ? 300 : 1;
         *at(t, TAA_COLOR, c, x, y) = (float)(bright * shade_random(seed));

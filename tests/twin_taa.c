@@ -44,7 +44,7 @@ static void to_ycocg(const double *rgb, double *v)
 static double clip(const shade_run *run, int x, int y, bool still, double *past)
 {
     double v[9][3], brightest = 0, low[3], high[3], p[3], out = 1;
-    double gamma = ((const twin_taa_params *)run->params)->clip_gamma * (still ? 2 : 1);
+    double gamma = ((const twin_taa_params *)run->params)->clip_gamma * (still ? 3 : 1);
     for (int i = 0; i < 9; i++) {
         double rgb[3];
         for (int c = 0; c < 3; c++)
@@ -101,7 +101,7 @@ static void follow(const frame_t *f, int x, int y, double z, double *d, double *
 }
 
 typedef struct place {
-    double d[2], then;
+    double d[2], then, low, high;
     bool alone, edge, behind, follows, still;
 } place;
 
@@ -113,8 +113,9 @@ static double snap(double d)
 
 static place find_place(const shade_run *run, int x, int y)
 {
-    place p = {.alone = true};
-    double own = depth_at(run, TAA_DEPTH, x, y), best = own, last = own, ignored, mine[2], front[2];
+    double own = depth_at(run, TAA_DEPTH, x, y);
+    place p = {.alone = true, .low = own, .high = own};
+    double best = own, last = own, ignored, mine[2], front[2];
     int at = 4;
     for (int i = 0; i < 9; i++) {
         int nx = x + i % 3 - 1, ny = y + i / 3 - 1;
@@ -122,8 +123,12 @@ static place find_place(const shade_run *run, int x, int y)
         at = z < best ? i : at;
         best = fmin(best, z);
         last = fmax(last, z);
-        if (run->images[TAA_STENCIL] && tap_id(run, TAA_STENCIL, nx, ny) != tap_id(run, TAA_STENCIL, x, y))
-            p.alone = false;
+        if (!run->images[TAA_STENCIL])
+            continue;
+        bool same = tap_id(run, TAA_STENCIL, nx, ny) == tap_id(run, TAA_STENCIL, x, y);
+        p.alone = p.alone && same;
+        p.low = same ? fmin(p.low, z) : p.low;
+        p.high = same ? fmax(p.high, z) : p.high;
     }
     p.edge = last > best * 1.02;
     p.alone = p.alone && !p.edge;
@@ -131,6 +136,8 @@ static place find_place(const shade_run *run, int x, int y)
     int nx = x + at % 3 - 1, ny = y + at / 3 - 1;
     follow(&run->frame, x, y, own, mine, &p.then);
     follow(&run->frame, nx, ny, best, front, &ignored);
+    p.low *= p.then / own;
+    p.high *= p.then / own;
     for (int i = 0; i < 2 && run->images[TAA_MOTION]; i++) {
         mine[i] = tap(run, TAA_MOTION, i, x, y);
         front[i] = tap(run, TAA_MOTION, i, nx, ny);
@@ -142,22 +149,31 @@ static place find_place(const shade_run *run, int x, int y)
     return p;
 }
 
-/* Whether history pixel (x, y) shows the surface of p or, where p is not alone, the 3x3 around it show its material at
- * depths around p's. */
-static bool shows(const shade_run *run, int x, int y, uint32_t id, const place *p)
+/* Whether history pixel (x, y) or most of 3x3 around it show the surface of p or, where p is not alone, the
+ * 3x3 around each pixel around (px, py) show its material at depths around p's. */
+static bool shows(const shade_run *run, int x, int y, double px, double py, uint32_t id, const place *p)
 {
     double low = 2 * far_depth, high = 0, z = p->then;
+    int same = 0;
     for (int i = 0; i < 9; i++) {
         int nx = x + i % 3 - 1, ny = y + i / 3 - 1;
         double t = depth_at(run, TAA_LAST_DEPTH, nx, ny);
         if (run->images[TAA_STENCIL] && tap_id(run, TAA_LAST_STENCIL, nx, ny) != id)
             continue;
-        if (p->alone && i == 4)
-            return fabs(t - z) <= 0.04 * z;
-        low = fmin(low, t);
-        high = fmax(high, t);
+        same += fabs(t - z) <= 0.04 * z;
+        if (p->alone && i == 4 && fabs(t - z) <= 0.04 * z)
+            return true;
     }
-    return !p->alone && z >= low * 0.98 && z <= high * 1.02;
+    for (int j = (int)floor(py) - 1; j <= (int)ceil(py) + 1; j++) {
+        for (int i = (int)floor(px) - 1; i <= (int)ceil(px) + 1; i++) {
+            double t = depth_at(run, TAA_LAST_DEPTH, i, j);
+            if (run->images[TAA_STENCIL] && tap_id(run, TAA_LAST_STENCIL, i, j) != id)
+                continue;
+            low = fmin(low, t);
+            high = fmax(high, t);
+        }
+    }
+    return p->alone ? same >= 5 : p->high >= low * 0.98 && p->low <= high * 1.02;
 }
 
 /* Weights of the samples at -2 … 3 for a place t in 0…1 ("Spline36"). */
@@ -207,7 +223,7 @@ void twin_taa(const shade_run *run, int x, int y, double *out)
     if (p->exclude[id / 32] >> id % 32 & 1)
         return;
     double n = tap(run, TAA_LAST_COUNT, 0, nx, ny);
-    if (!shows(run, nx, ny, id, &at) || (n < 0 && (at.alone || (at.behind && !at.follows))))
+    if (!shows(run, nx, ny, px, py, id, &at) || (n < 0 && (at.alone || (at.behind && !at.follows))))
         return;
     n = at.edge && !at.still ? fmin(fabs(n), 4) : fabs(n);
     for (int c = 0; c < 3; c++)

@@ -22,8 +22,9 @@ static unsigned find_id(const rl_materials *m, int64_t id)
 static rl_code fail_default(const filler *f, const rl_node *node, const rl_value *v)
 {
     return rl_fail(f->err, RL_E_CONFIG, v->where,
-                   "pass '%s' (%s): '%s' has no material of its own%s; add one for it to 'materials'", node->name,
-                   node->pass->name, v->text, f->m->other ? ", 'default' covers it with others" : "");
+                   "pass '%s' (%s): '%s' has no material of its own%s; add one for it to 'materials'",
+                   node->name, node->pass->name, v->text,
+                   f->m->other ? ", 'default' covers it with others" : "");
 }
 
 static rl_code fail_name(const filler *f, const rl_node *node, const rl_value *v)
@@ -34,8 +35,8 @@ static rl_code fail_name(const filler *f, const rl_node *node, const rl_value *v
         return rl_fail_memory(f->err, f->m->count * sizeof *known);
     for (size_t i = 1; i < f->m->count; i++)
         known[n++] = f->m->names[i];
-    char *text = rl_arena_printf(f->arena, "pass '%s' (%s): there is no material '%s'", node->name, node->pass->name,
-                                 v->text);
+    char *text = rl_arena_printf(f->arena, "pass '%s' (%s): there is no material '%s'", node->name,
+                                 node->pass->name, v->text);
     return rl_fail_suggest(f->err, v->where, text, v->text, known, n);
 }
 
@@ -82,8 +83,8 @@ static rl_code fill_row(const filler *f, const rl_node *node, const rl_param *ro
     if (!v || (v->kind == RL_LIST && !v->n))
         return RL_OK;
     if (f->m->count > 32 * RL_SET_WORDS)
-        return rl_fail(f->err, RL_E_CONFIG, v->where, "'%s' works with up to %u materials, there are %zu", row->name,
-                       32 * RL_SET_WORDS - 1, f->m->count - 1);
+        return rl_fail(f->err, RL_E_CONFIG, v->where, "'%s' works with up to %u materials, there are %zu",
+                       row->name, 32 * RL_SET_WORDS - 1, f->m->count - 1);
     if (v->kind != RL_LIST)
         return add_one(f, node, v, set);
     rl_code code = RL_OK;
@@ -113,7 +114,8 @@ static rl_code fill_node(const filler *f, rl_node *node)
 }
 
 rl_code rl_material_sets_fill(rl_arena *arena, const rl_node *nodes, size_t n_nodes, const rl_materials *m,
-                              const rl_stencil_name *names, size_t n_names, const rl_node **out, rl_error *err)
+                              const rl_stencil_name *names, size_t n_names, const rl_node **out,
+                              rl_error *err)
 {
     filler f = {arena, m, names, n_names, err};
     rl_node *copy = rl_arena_array(arena, n_nodes + 1, sizeof *copy);

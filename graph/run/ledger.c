@@ -4,6 +4,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <inttypes.h>
+#include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -19,6 +20,7 @@ struct rl_ledger {
     rl_arena arena;
     rl_frames frames;
     rl_ledger_line *entries; /* [frames.n] */
+    pthread_mutex_t mutex;   /* guards them while one thread writes and another asks for inputs */
     rl_ledger_line none;
     const char *path; /* of this process's file */
     int fd;           /* -1: nothing written yet */
@@ -124,6 +126,7 @@ rl_code rl_ledger_open(const char *folder, const char *name, const char *tag, co
     *out = l;
     if (!l)
         return rl_fail_memory(err, sizeof *l);
+    pthread_mutex_init(&l->mutex, NULL);
     l->fd = -1;
     l->frames = *frames;
     l->entries = rl_arena_array(&l->arena, frames->n + 1, sizeof *l->entries);
@@ -143,6 +146,7 @@ void rl_ledger_close(rl_ledger **ledger)
         return;
     if (l->fd >= 0)
         close(l->fd);
+    pthread_mutex_destroy(&l->mutex);
     rl_arena_free(&l->arena);
     rl_free(l);
 }
@@ -169,7 +173,9 @@ rl_code rl_ledger_write(rl_ledger *l, int frame, rl_ledger_kind kind, uint64_t c
         return rl_fail(err, RL_E_INTERNAL, RL_NOWHERE, "frame %d is not of this capture", frame);
     rl_ledger_line *e = &l->entries[i];
     uint64_t now = wall_ns();
+    pthread_mutex_lock(&l->mutex);
     *e = (rl_ledger_line){kind, now > e->time ? now : e->time + 1, chain, *inputs};
+    pthread_mutex_unlock(&l->mutex);
     if (l->fd < 0)
         l->fd = open(l->path, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
     int n = print_line(line, sizeof line, frame, e);
@@ -213,7 +219,7 @@ static uint64_t hash_content(const char *const *paths, size_t n, bool *good)
     return content;
 }
 
-rl_inputs rl_ledger_inputs(const rl_ledger *l, int frame, const char *const *paths, size_t n)
+rl_inputs rl_ledger_inputs(rl_ledger *l, int frame, const char *const *paths, size_t n)
 {
     rl_inputs in = {.stat = n};
     for (size_t i = 0; i < n; i++) {
@@ -223,9 +229,11 @@ rl_inputs rl_ledger_inputs(const rl_ledger *l, int frame, const char *const *pat
         int64_t of_file[3] = {(int64_t)st.st_size, (int64_t)st.st_mtim.tv_sec, (int64_t)st.st_mtim.tv_nsec};
         in.stat = XXH3_64bits_withSeed(of_file, sizeof of_file, in.stat);
     }
-    const rl_ledger_line *known = rl_ledger_find(l, frame);
-    if (known->inputs.stat == in.stat && known->inputs.content) {
-        in.content = known->inputs.content;
+    pthread_mutex_lock(&l->mutex);
+    rl_inputs known = rl_ledger_find(l, frame)->inputs;
+    pthread_mutex_unlock(&l->mutex);
+    if (known.stat == in.stat && known.content) {
+        in.content = known.content;
         return in;
     }
     bool good;

@@ -2,7 +2,7 @@
  * so that a later run can tell which pictures are whole, which inputs they were made from, and by what. One
  * file a process (shards of one run may share a folder, also over a network); all of a capture's are read.
  *
- * One thread writes; others may look up frames that are not being written. */
+ * One thread writes and finds; rl_ledger_inputs may be called from any. */
 #ifndef RL_RUN_LEDGER_H
 #define RL_RUN_LEDGER_H
 
@@ -51,7 +51,7 @@ const rl_ledger_line *rl_ledger_find(const rl_ledger *ledger, int frame); /* nev
 
 /* Hashes the files of a frame, or takes the hash from the ledger when their sizes and times are what they
  * were. */
-rl_inputs rl_ledger_inputs(const rl_ledger *ledger, int frame, const char *const *paths, size_t n);
+rl_inputs rl_ledger_inputs(rl_ledger *ledger, int frame, const char *const *paths, size_t n);
 
 /* BEGUN is written before the first picture of a frame that has a line already is touched, DONE when all are
  * whole. */

@@ -63,6 +63,8 @@ rl_code rl_session_open(const rl_options *options, rl_session **out, rl_error *e
     if (!code)
         code = rl_session_paths(s, err);
     if (!code)
+        code = rl_session_count(s, err);
+    if (!code)
         code = rl_session_check_memory(s, err);
     if (code)
         rl_session_close(&s);

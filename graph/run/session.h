@@ -42,6 +42,9 @@ typedef struct rl_sequence {
     uint64_t decode_bytes; /* that reading it takes besides its buffers */
     rl_reader *reader;
     rl_executor *executor; /* NULL until prepared */
+    bool has_last;         /* the frame that ran last, and may be the past of the next one */
+    int last_number;
+    camera_t last_camera;
 } rl_sequence;
 
 struct rl_session {
@@ -60,6 +63,7 @@ struct rl_session {
     size_t n_outputs;
     rl_sequence *sequences;
     size_t n_sequences;
+    size_t *ends; /* [n_sequences] how many frames captures 0…k have together */
     /* rl_session_process: its one frame */
     rl_frame frame;
     rl_sequence *frame_sequence; /* NULL: none yet */
@@ -86,9 +90,9 @@ void rl_sequence_close(rl_sequence *sequence);
 /* session_paths.c: no two outputs, captures or frames write one file. */
 rl_code rl_session_paths(rl_session *session, rl_error *err);
 
-/* session_run.c (batches of frames: session_batch.c): runs the kernels on a loaded frame. `cut`: history does not reach here. `spans`: NULL, or plan->n_steps
- * of them. */
-rl_code rl_session_execute(rl_session *session, rl_sequence *sequence, rl_frame *frame, bool cut, rl_span *spans,
+/* session_run.c (batches of frames: session_batch.c): runs the kernels on a loaded frame, and decides whether history reaches
+ * it. `spans`: NULL, or plan->n_steps of them. */
+rl_code rl_session_execute(rl_session *session, rl_sequence *sequence, rl_frame *frame, rl_span *spans,
                            rl_error *err);
 /* Buffers follow the size of the frame that they hold. */
 rl_code rl_session_fit_buffers(rl_sequence *sequence, rl_frame *frame, rl_error *err);
@@ -99,6 +103,9 @@ rl_code rl_session_write_frame(rl_session *session, rl_sequence *sequence, rl_fr
 /* Where the planes of a graph output's image are, mapped; unmap with the memory. */
 rl_code rl_session_map_image(const rl_sequence *sequence, const rl_frame *frame, int buffer, rl_sink_image *out,
                              rl_memory **memory, rl_error *err);
+
+/* session_shard.c: checks the options of shards and counts frames. */
+rl_code rl_session_count(rl_session *session, rl_error *err);
 
 /* session_memory.c: bytes that a run of a sequence allocates at most with so many frames in flight, saturating: the
  * plan's buffers, and what reading, writing and checkpoints take besides. 0 when the size is not known (frames in

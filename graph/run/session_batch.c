@@ -17,9 +17,6 @@ typedef struct batch_state {
     size_t done, total; /* frames of all captures that this run writes */
     rl_sequence_state state;
     rl_span *spans; /* [plan->n_steps] when somebody wants to know */
-    bool history;   /* the frame before this one ran, without a gap */
-    int previous;
-    camera_t camera;
 } batch_state;
 
 /* The frame of a number, under the files of another one when that is held. */
@@ -91,17 +88,6 @@ static void batch_load(void *ctx, size_t item, int slot)
     rl_session_span(b->hooks, b->q, f, RL_LANE_READ, "read", "decode", start);
 }
 
-/* History ends where the manifest says, at a gap of the numbers, after a frame that failed, at a jump of the
- * camera. */
-static bool is_cut(const batch_state *b, const rl_frame *f)
-{
-    const rl_manifest *m = b->q->manifest;
-    if (!b->history || rl_frames_find(&m->cuts, f->number) >= 0)
-        return true;
-    long here = rl_frames_find(&m->frames, f->number), last = rl_frames_find(&m->frames, b->previous);
-    return here != last + 1 || rl_camera_jumped(&b->camera, &f->camera, 10);
-}
-
 static void batch_run(void *ctx, size_t item, int slot)
 {
     batch_state *b = ctx;
@@ -110,17 +96,15 @@ static void batch_run(void *ctx, size_t item, int slot)
     double start = rl_state_now();
     bool restored = false;
     rl_session_stage(b->hooks, RL_LANE_RUN, f);
-    rl_state_ready(&b->state, work, slot, &restored, &b->previous, &b->camera, &f->error);
-    b->history = restored || (b->history && work->start == RL_START_ON);
-    bool cut = f->error.code || b->held[slot] || is_cut(b, f);
+    rl_sequence *q = b->q;
+    rl_state_ready(&b->state, work, slot, &restored, &q->last_number, &q->last_camera, &f->error);
+    q->has_last = !f->error.code && !b->held[slot] && (restored || (q->has_last && work->start == RL_START_ON));
     if (!f->error.code)
-        rl_session_execute(b->s, b->q, f, cut, b->spans, &f->error);
+        rl_session_execute(b->s, q, f, b->spans, &f->error);
     if (!f->error.code)
         rl_session_step_spans(b->hooks, b->s, b->q, f, b->spans);
-    b->history = !f->error.code && !b->held[slot]; /* a held frame is no past of the next one */
-    rl_state_ran(&b->state, slot, f, b->history);
-    b->previous = f->number;
-    b->camera = f->camera;
+    q->has_last = !f->error.code && !b->held[slot]; /* a held frame is no past of the next one */
+    rl_state_ran(&b->state, slot, f, q->has_last);
     f->run_s = rl_state_now() - start;
     rl_session_span(b->hooks, b->q, f, RL_LANE_RUN, "run", "kernels", start);
 }
@@ -187,6 +171,7 @@ static rl_code run_frames(batch_state *b, bool *stopped, rl_error *err)
     rl_state_announce(&b->state);
     if (b->hooks && b->hooks->span)
         b->spans = rl_arena_array(&b->state.arena, b->q->plan->n_steps + 1, sizeof *b->spans);
+    b->q->has_last = false;
     rl_code code = rl_batch_run(&batch, &finished, err);
     *stopped = finished < b->state.n_work;
     if (!code)

@@ -4,6 +4,7 @@
 
 #include "graph/base/alloc.h"
 #include "graph/base/file.h"
+#include "graph/run/camera.h"
 #include "graph/run/session_notes.h"
 
 rl_code rl_session_fit_buffers(rl_sequence *q, rl_frame *f, rl_error *err)
@@ -14,13 +15,24 @@ rl_code rl_session_fit_buffers(rl_sequence *q, rl_frame *f, rl_error *err)
     return rl_frame_buffers_new(q->executor, &f->geometry, &f->buffers, err);
 }
 
-rl_code rl_session_execute(rl_session *s, rl_sequence *q, rl_frame *f, bool cut, rl_span *spans,
+/* History ends where the manifest says, at a gap of the numbers, after a frame that failed, at a jump of the camera. */
+static bool is_cut(const rl_sequence *q, const rl_frame *f)
+{
+    const rl_manifest *m = q->manifest;
+    if (!q->has_last || rl_frames_find(&m->cuts, f->number) >= 0)
+        return true;
+    long here = rl_frames_find(&m->frames, f->number), last = rl_frames_find(&m->frames, q->last_number);
+    bool gap = here >= 0 && last >= 0 ? here != last + 1 : f->number != q->last_number + 1;
+    return gap || rl_camera_jumped(&q->last_camera, &f->camera, 10);
+}
+
+rl_code rl_session_execute(rl_session *s, rl_sequence *q, rl_frame *f, rl_span *spans,
                            rl_error *err)
 {
     rl_code code = rl_executor_resize(q->executor, &f->geometry, err);
     if (code)
         return code;
-    if (cut)
+    if (is_cut(q, f))
         rl_executor_cut(q->executor);
     rl_session_light_values(q, &f->camera, q->light_values);
     rl_frame_values values = {
@@ -29,7 +41,11 @@ rl_code rl_session_execute(rl_session *s, rl_sequence *q, rl_frame *f, bool cut,
         .lights = q->light_values,
         .n_lights = (int)q->n_lights,
         .ambient = &s->ambient};
-    return rl_executor_run(q->executor, f->buffers, &values, spans, err);
+    code = rl_executor_run(q->executor, f->buffers, &values, spans, err);
+    q->has_last = !code;
+    q->last_number = f->number;
+    q->last_camera = f->camera;
+    return code;
 }
 
 /* ---- writing ---------------------------------------------------------------------------------------------
@@ -138,8 +154,7 @@ rl_code rl_session_write_frame(rl_session *s, rl_sequence *q, rl_frame *f, const
 void rl_session_cut(rl_session *s)
 {
     for (size_t i = 0; i < s->n_sequences; i++)
-        if (s->sequences[i].executor)
-            rl_executor_cut(s->sequences[i].executor);
+        s->sequences[i].has_last = false;
 }
 
 rl_code rl_session_process(rl_session *s, size_t capture, long long number, const rl_frame_data *data,
@@ -168,8 +183,9 @@ rl_code rl_session_process(rl_session *s, size_t capture, long long number, cons
         code = data ? rl_reader_memory_pixels(q->reader, data, f, s->pool, err)
                     : rl_reader_pixels(q->reader, f, s->pool, err);
     if (!code)
-        code = rl_session_execute(s, q, f, false, NULL, err);
+        code = rl_session_execute(s, q, f, NULL, err);
     s->processed = !code;
+    q->has_last = q->has_last && !code;
     return code;
 }
 

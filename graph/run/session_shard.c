@@ -20,16 +20,24 @@ bool rl_sequence_is_cut(const rl_sequence *q, size_t i)
            rl_frames_find(&m->frames, q->frames.numbers[i - 1]) + 1;
 }
 
+rl_code rl_session_count(rl_session *s, rl_error *err)
+{
+    const int *shard = s->options.shard;
+    if (shard[1] && (shard[0] < 1 || shard[0] > shard[1]))
+        return rl_fail(err, RL_E_USAGE, RL_NOWHERE, "there is no shard %d of %d", shard[0], shard[1]);
+    if (s->options.preroll < 0 || s->options.checkpoint_frames < 0)
+        return rl_fail(err, RL_E_USAGE, RL_NOWHERE, "a number of frames cannot be negative");
+    size_t sum = 0;
+    s->ends = rl_arena_array(&s->arena, s->n_sequences + 1, sizeof *s->ends);
+    for (size_t k = 0; s->ends && k < s->n_sequences; k++)
+        s->ends[k] = sum += s->sequences[k].frames.n;
+    return s->ends ? RL_OK : rl_fail_memory(err, s->n_sequences * sizeof *s->ends);
+}
+
 /* The index, over the frames of all captures, at which the i-th shard (from 0) begins. */
 static size_t shard_begin(const rl_session *s, size_t i)
 {
-    enum { MOST = 4096 };
-    size_t ends[MOST], sum = 0, n = s->n_sequences < MOST ? s->n_sequences : MOST;
-    for (size_t k = 0; k < n; k++) {
-        sum += s->sequences[k].frames.n;
-        ends[k] = sum;
-    }
-    return rl_shard_begin(i, (size_t)s->options.shard[1], ends, n);
+    return rl_shard_begin(i, (size_t)s->options.shard[1], s->ends, s->n_sequences);
 }
 
 static size_t within(size_t x, size_t low, size_t high)

@@ -160,21 +160,24 @@ static size_t history_begins(const rl_sequence_state *st)
     return i;
 }
 
-/* What a killed run left of the files that this one will write. */
+/* What a killed run left of the files that this one may write. */
 static void clean_up(rl_sequence_state *st)
 {
     const rl_session *s = st->session;
+    const int *numbers = st->sequence->frames.numbers;
     rl_arena arena = {0};
     size_t n = 0;
-    const char **paths = rl_arena_array(&arena, st->n_work * (s->n_outputs + 1) + 1, sizeof *paths);
-    for (size_t w = 0; paths && w < st->n_work; w++) {
-        int frame = st->sequence->frames.numbers[st->work[w].frame];
-        paths[n] = rl_checkpoint_path(&arena, st->folder, st->name, frame);
+    const char **paths =
+        rl_arena_array(&arena, st->n_work * s->n_outputs + (st->last - st->first) + 1, sizeof *paths);
+    for (size_t i = st->first; paths && i < st->last; i++) {
+        paths[n] = rl_checkpoint_path(&arena, st->folder, st->name, numbers[i]);
         n += paths[n] != NULL;
+    }
+    for (size_t w = 0; paths && w < st->n_work; w++) {
         for (size_t i = 0; i < s->n_outputs && st->work[w].write; i++) {
             const char *name;
-            if (rl_output_path(&arena, s->outputs[i].spec, st->sequence->manifest->name, frame, NULL, &name,
-                               NULL))
+            if (rl_output_path(&arena, s->outputs[i].spec, st->sequence->manifest->name,
+                               numbers[st->work[w].frame], NULL, &name, NULL))
                 continue;
             paths[n] = rl_path_join(&arena, s->options.out ? s->options.out : "out", name);
             n += paths[n] != NULL;
@@ -242,7 +245,8 @@ static rl_code make_folder(const rl_sequence_state *st, rl_error *err)
         return rl_folder_make(st->folder, err);
     if (!rl_folder_make(st->folder, &why))
         return RL_OK;
-    rl_report(st->session->log, RL_WARNING, (rl_where){.file = why.file}, "%s; --resume will not find this run", why.text);
+    rl_report(st->session->log, RL_WARNING, (rl_where){.file = why.file},
+              "%s; --resume will not find this run", why.text);
     return RL_OK;
 }
 
@@ -307,14 +311,18 @@ void rl_state_ready(rl_sequence_state *st, const rl_work *w, int slot, bool *res
     if (w->start == RL_START_CHECKPOINT)
         rl_state_restore(st, numbers[w->frame - 1], restored, previous, camera, err);
     bool alone = !st->chained || st->cut[w->frame];
-    slot_state->chain = extend(alone ? st->root : st->chain, numbers[w->frame], slot_state->content);
+    uint64_t before = alone ? st->root : st->chain;
+    slot_state->chain = extend(before, numbers[w->frame], slot_state->content);
+    slot_state->hoped = slot_state->inputs.missing
+                            ? slot_state->chain
+                            : extend(before, numbers[w->frame], slot_state->inputs.content);
 }
 
 void rl_state_ran(rl_sequence_state *st, int slot, const rl_frame *f, bool keeps)
 {
     rl_slot_state *slot_state = &st->slots[slot];
     st->chained = keeps;
-    st->chain = slot_state->chain;
+    st->chain = keeps ? slot_state->chain : slot_state->hoped;
     st->last_frame = f->number;
     st->since++;
     if (keeps && st->history && rl_state_is_due(st))

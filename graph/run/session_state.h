@@ -1,5 +1,5 @@
 /* The state of a run of one sequence: which frames it takes on, what is known of those that are done, where
- * history comes from and where it is saved. session_run.c calls it from its three stages.
+ * history comes from and where it is saved. session_batch.c calls it from its three stages.
  *
  * The chain of a frame is a hash of all that its pictures depend on: the identity of the run (checkpoint.h)
  * and the inputs of every frame since history began. Equal chains mean equal bits. It may differ where bits
@@ -22,6 +22,7 @@ typedef struct rl_slot_state {
     rl_inputs inputs; /* its own files */
     uint64_t content; /* theirs, and of the frame that it holds */
     uint64_t chain;
+    uint64_t hoped;      /* its chain if its own files could be used */
     rl_checkpoint saved; /* history NULL: none to be written */
     double saved_s;      /* seconds that taking it cost */
 } rl_slot_state;
