@@ -17,17 +17,17 @@ typedef struct lighting_params {
 } lighting_params;
 
 static const rl_param params[] = {
+    /* `shadow: screen` marches through the depth buffer: occluders out of the camera's sight or outside of the image cast no
+     * shadow, back faces are not shadowed, and the shadow's thickness is unknown. */
     P(lighting_params, RL_I32, shadow_steps, 1, 16384, 256, "steps",
-      "lights with shadow: screen: most places on the way to the light that are looked at; ways of up to so many pixels "
-      "miss nothing that the camera sees. Occluders out of its sight, or outside of the image or crop, cast no shadow, "
-      "back faces are not shadowed, and the shadow's thickness is unknown",
+      "shadow: screen: places on the way to the light that are looked at, at most one a pixel",
       .source = "McGuire and Mara 2014"),
     P(lighting_params, RL_F32, shadow_thickness_m, 0, 1e6, 0.1, "m",
-      "shadow: screen: how deep occluders are taken to be, along the view axis; rays that pass farther behind are free"),
+      "shadow: screen: how deep occluders are taken to be, along the view axis"),
     P(lighting_params, RL_F32, shadow_bias_m, 0, 1e3, 0.001, "m",
-      "shadow: screen: how far behind the surface a ray must be to be blocked; raise it for depth in half precision"),
+      "shadow: screen: how far behind a surface a ray must be to be blocked"),
     P(lighting_params, RL_BOOL, shadow_jitter, 0, 1, 1, "",
-      "shadow: screen: where shadow_steps does not reach every pixel, begin at a random one, a pixel and frame"),
+      "shadow: screen: begin at a random place where shadow_steps does not reach every pixel"),
     P(lighting_params, RL_I32, seed, 0, 2147483647, 0, "", "of shadow_jitter"),
 };
 RL_PARAMS_MATCH(lighting_params, 5);
