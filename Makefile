@@ -9,6 +9,7 @@
 #   make bench       kernels and codecs against their peers
 #   make temporal    CAPTURES="folders": temporal anti-aliasing against the truth, and its flicker: tables and strips
 #   make accuracy    TRUTH=folder: every model against a path-traced truth (tests/accuracy.c)
+#   make docs        passes/README.md from the passes' tables, and its pictures (make docs-page: the tables alone)
 #   make install     PREFIX=/usr/local: program, library, headers, relit.pc, configs, kernels
 #   make deps        Debian packages
 #   make format      clang-format 14 (make format-check only looks); make layers: includes point one way only
@@ -202,6 +203,13 @@ accuracy: all $(BUILD)/tests/accuracy
 	@test -n "$(TRUTH)" || { echo "give TRUTH=folder, as tests/accuracy_scene.h describes it" >&2; exit 2; }
 	@$(BUILD)/tests/accuracy $(TRUTH) $(OUT)
 
+# Half a minute, for the dense sum; `make test` checks that the page is up to date.
+docs: all
+	RELIT=$(BUILD)/relit passes/docs/pictures.sh
+	@$(MAKE) --no-print-directory docs-page
+docs-page: all
+	RELIT=$(BUILD)/relit passes/docs/page.sh > passes/README.md.tmp && mv passes/README.md.tmp passes/README.md
+
 install: all
 	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/lib/pkgconfig $(DESTDIR)$(PREFIX)/lib/relit \
 	  $(DESTDIR)$(PREFIX)/include/relit/graph/base $(DESTDIR)$(PREFIX)/share/relit/kernels
@@ -228,4 +236,4 @@ layers:
 clean:
 	rm -rf $(BUILD) build-asan
 
-.PHONY: all demo bench test test-build test-asan deps install format format-check layers clean fuzz accuracy soak slurm-test temporal
+.PHONY: all demo bench test test-build test-asan deps install format format-check layers clean fuzz accuracy docs docs-page soak slurm-test temporal

@@ -5,6 +5,7 @@
 
 #include "graph/model/graph.h"
 #include "graph/model/params.h"
+#include "graph/tool/markdown.h"
 #include "graph/tool/tool.h"
 
 static const char *const role_names[] = {"in", "out", "history", "scratch"};
@@ -237,20 +238,36 @@ static rl_code unknown(const rl_tool *tool, rl_error *err)
     return RL_E_USAGE;
 }
 
+static void print_kernel(bool markdown, rl_str *out)
+{
+    if (markdown)
+        rl_str_printf(out, "```%s```\n", kernel_keys);
+    else
+        rl_str_printf(out, "%s: %s\n%s", kernel_name, kernel_help, kernel_keys);
+}
+
 int rl_cmd_passes(rl_tool *tool, rl_error *err)
 {
-    const rl_pass *pass = tool->args.operand ? rl_pass_find(tool->args.operand) : NULL;
+    const char *name = tool->args.operand;
+    const rl_pass *pass = name ? rl_pass_find(name) : NULL;
+    bool kernel = name && !strcmp(name, kernel_name), markdown = tool->args.markdown;
     rl_str text = {0};
-    if (tool->args.operand && !strcmp(tool->args.operand, kernel_name)) {
-        rl_str_printf(&text, "%s: %s\n%s", kernel_name, kernel_help, kernel_keys);
-        return rl_tool_print(tool, &text, err);
-    }
-    if (tool->args.operand && !pass) {
+    if (name && !pass && !kernel) {
         unknown(tool, err);
         return RL_EXIT_WRONG;
     }
-    if (tool->args.json)
+    if (tool->args.json && markdown) {
+        rl_fail_file(err, RL_E_USAGE, "relit passes", "--json and --markdown exclude each other");
+        return RL_EXIT_WRONG;
+    }
+    if (kernel)
+        print_kernel(markdown, &text);
+    else if (tool->args.json)
         print_json(pass, &text);
+    else if (markdown && pass)
+        rl_markdown_pass(pass, &text);
+    else if (markdown)
+        rl_markdown_list(&text);
     else if (pass)
         print_pass(pass, &text);
     else

@@ -88,6 +88,8 @@ static const option options[] = {
     {"json", NULL, TIMED | RL_CMD_PASSES | RL_CMD_DEVICES | RL_CMD_DIFF, FLAG, AT(json),
      .help = "print JSON on stdout (run: an object a frame, each\n"
              "on its line)"},
+    {"markdown", NULL, RL_CMD_PASSES, FLAG, AT(markdown),
+     .help = "print Markdown tables, as in passes/README.md"},
     {"size", "WxH", RL_CMD_BENCH, SIZE, AT(size),
      .help = "time frames of that size: the capture's pixels\n"
              "repeated or left out; default: as they are"},

@@ -49,7 +49,7 @@ typedef struct rl_arguments {
     const char *metric, *heatmap;
     const char *const *fail_over; /* "flip.p95=0.05", "0.02" */
     size_t n_fail_over;
-    bool json, quiet, verbose, help;
+    bool json, markdown, quiet, verbose, help;
 } rl_arguments;
 
 /* Reads the words behind the command's name. An error is RL_E_USAGE and names the nearest option. */
