@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "graph/model/lights.h"
+#include "graph/model/manifest.h"
 #include "graph/model/temperature.h"
 
 static const double same[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
@@ -220,13 +221,26 @@ static void test_keys(void **state)
     refuse("temperature: 5000, tint: 0.1", "t.yaml:1:78: error: 'tint' is 0.1: out of range, -0.05 to 0.05");
 }
 
+/* A manifest's lights read back as they were. */
+static void test_print(void **state)
+{
+    (void)state;
+    rl_manifest m = {0};
+    rl_str out = {0};
+    config_assert_fine(parse("temperature: 2700, tint: -0.0125", &m.lights));
+    m.unit = 1;
+    rl_manifest_print(&m, &out);
+    assert_non_null(strstr(rl_str_text(&out), "candela: [683, 683, 683], temperature: 2700, tint: -0.0125"));
+    rl_str_free(&out);
+}
+
 #define T(f) cmocka_unit_test_setup_teardown(f, config_setup, config_teardown)
 
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         T(test_published),   T(test_fits),    T(test_tint), T(test_rgb),
-        T(test_other_space), T(test_inverse), T(test_keys),
+        T(test_other_space), T(test_inverse), T(test_keys), T(test_print),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
