@@ -17,17 +17,15 @@ typedef struct lighting_params {
 } lighting_params;
 
 static const rl_param params[] = {
-    /* `shadow: screen` marches through the depth buffer: occluders out of the camera's sight or outside of the image cast no
-     * shadow, back faces are not shadowed, and the shadow's thickness is unknown. */
-    P(lighting_params, RL_I32, shadow_steps, 1, 16384, 256, "steps",
-      "shadow: screen: places on the way to the light that are looked at, at most one a pixel",
+    P(lighting_params, RL_I32, shadow_steps, 1, 16384, 128, "steps",
+      "shadow: screen: most steps of a ray; ways of up to so many pixels miss nothing that is in sight",
       .source = "McGuire and Mara 2014"),
-    P(lighting_params, RL_F32, shadow_thickness_m, 0, 1e6, 0.1, "m",
-      "shadow: screen: how deep occluders are taken to be, along the view axis"),
-    P(lighting_params, RL_F32, shadow_bias_m, 0, 1e3, 0.001, "m",
-      "shadow: screen: how far behind a surface a ray must be to be blocked"),
+    P(lighting_params, RL_F32, shadow_thickness_m, 0, 1e6, 0.05, "m",
+      "shadow: screen: depth of occluders behind what is seen; what is out of sight or crop casts no shadow"),
+    P(lighting_params, RL_F32, shadow_bias_m, 0, 1e3, 0.0005, "m",
+      "shadow: screen: how far behind a surface rays are blocked; more for depth in half precision"),
     P(lighting_params, RL_BOOL, shadow_jitter, 0, 1, 1, "",
-      "shadow: screen: begin at a random place where shadow_steps does not reach every pixel"),
+      "shadow: screen: rays that leave pixels out begin at a random one, a pixel and frame"),
     P(lighting_params, RL_I32, seed, 0, 2147483647, 0, "", "of shadow_jitter"),
 };
 RL_PARAMS_MATCH(lighting_params, 5);
@@ -77,8 +75,8 @@ static const rl_port ports[] = {
     {"stencil", RL_READ, RL_ID, .help = "material"},
     {"thickness", RL_READ, RL_SCALAR, .help = "metres along the inward normal, 0 = unknown",
      .optional = true},
-    {"shadow", RL_READ, RL_LIGHTS, .help = "visibility of each light, 0 to 1", .optional = true},
-    {"shadow_thickness", RL_READ, RL_LIGHTS, .help = "metres along the light's ray, 0 where lit",
+    {"shadow", RL_READ, RL_LIGHTS, .help = "visibility of each light, 0 to 1; shadow: screen needs none, and leaves back faces lit", .optional = true},
+    {"shadow_thickness", RL_READ, RL_LIGHTS, .help = "metres along the light's ray, 0 where lit; unknown with shadow: screen",
      .optional = true},
     {"roughness", RL_READ, RL_SCALAR, .help = "perceptual, 0 to 1", .optional = true},
     {"specular", RL_READ, RL_SCALAR, .help = "reflectance at normal incidence, 0 to 1", .optional = true},
