@@ -1,4 +1,4 @@
-/* Light on the G-buffer, behind sg.cl, surface.cl and sg_shade.cl. */
+/* Light on the G-buffer, behind sg.cl, surface.cl, sg_shade.cl and screen_shadow.cl. */
 
 /* How much of the light on the back face comes through, without cosine, F_in and 1/pi (DESIGN 4.5): the slab of
  * Golubev 2018, (e^-st + 3 e^-st/3) / 4, or Helix's Beer-Lambert law. `back` is |n.l| there. */
@@ -32,10 +32,11 @@ static inline void through(constant material_t *m, const surface_t *s, const ray
 }
 
 /* Sums of one material over all lights: E F_in (with what comes through), and the specular radiance. */
-static inline void sum_lights(constant material_t *m, const surface_t *s, constant frame_t *f, constant light_t *lights,
-                              global const float *shadow, global const float *shadow_thickness, int at, floatv *diffuse,
-                              floatv *specular)
+static inline void sum_lights(constant material_t *m, const surface_t *s, constant params_t *p, constant frame_t *f,
+                              constant light_t *lights, global const float *depth, global const float *shadow,
+                              global const float *shadow_thickness, int x, int y, floatv *diffuse, floatv *specular)
 {
+    int at = rl_index(f, x, y);
     int transmits = m->has_profile && m->shading_transmission && m->profile_transmission != OPAQUE;
     int scattered = scatters(m);
     for (int i = 0; i < f->lights; i++) {
@@ -49,6 +50,8 @@ static inline void sum_lights(constant material_t *m, const surface_t *s, consta
         r.has_thickness = 0;
         if (HAS_shadow && light->shadow >= 0)
             r.visibility = rl_load(shadow, light->shadow * f->plane + at);
+        if (LIGHTS_MARCH && light->shadow == SHADOW_MARCH)
+            r.visibility = march(depth, p, f, light, s->z, s->here & (r.nl > 0.0f) & (r.falloff > 0.0f), i, x, y);
         if (HAS_shadow_thickness && (transmits || scattered) && light->shadow_thickness >= 0) {
             r.shadow_thickness = rl_load(shadow_thickness, light->shadow_thickness * f->plane + at);
             r.has_thickness = 1;
@@ -86,14 +89,15 @@ static inline floatv given(float own, int has_layer, global const float *layer, 
 }
 
 /* One material for a whole vector: what enters (`diffuse`) and what is complete (`lit`). */
-static inline void shade(constant material_t *m, surface_t *s, constant frame_t *f, constant light_t *lights,
-                         constant ambient_t *ambient, global const float *shadow,
-                         global const float *shadow_thickness, int at, floatv *diffuse, floatv *lit)
+static inline void shade(constant material_t *m, surface_t *s, constant params_t *p, constant frame_t *f,
+                         constant light_t *lights, constant ambient_t *ambient, global const float *depth,
+                         global const float *shadow, global const float *shadow_thickness, int x, int y, floatv *diffuse,
+                         floatv *lit)
 {
     floatv sum[3] = {0.0f, 0.0f, 0.0f};
     for (int c = 0; c < 3; c++)
         lit[c] = diffuse[c] = 0.0f;
-    sum_lights(m, s, f, lights, shadow, shadow_thickness, at, sum, lit);
+    sum_lights(m, s, p, f, lights, depth, shadow, shadow_thickness, x, y, sum, lit);
     if (ambient->on)
         add_ambient(m, s, ambient, sum);
     floatv scale = (1.0f / RL_PI) * (1.0f - s->metallic);
@@ -111,8 +115,8 @@ kernel void lighting(global const float *albedo, global const float *normal, glo
                      global const uint *stencil, global const float *thickness, global const float *shadow,
                      global const float *shadow_thickness, global const float *roughness, global const float *specular,
                      global const float *metallic, global const float *emission, global const float *curvature,
-                     global const float *smooth_normal, global float *diffuse, global float *lit, constant frame_t *f, constant material_t *materials, constant light_t *lights,
-                     constant ambient_t *ambient)
+                     global const float *smooth_normal, global float *diffuse, global float *lit, constant params_t *p, constant frame_t *f,
+                     constant material_t *materials, constant light_t *lights, constant ambient_t *ambient)
 {
     int x = RL_W * (int)get_global_id(0), y = (int)get_global_id(1), at = rl_index(f, x, y);
     uintv id = rl_load_id(stencil, at);
@@ -139,7 +143,8 @@ kernel void lighting(global const float *albedo, global const float *normal, glo
         s.metallic = given(m->material_metallic, HAS_metallic, metallic, at, 0.0f);
         if (scatters(m))
             scatter_surface(m, &s, f, curvature, smooth_normal, at);
-        shade(m, &s, f, lights, ambient, shadow, shadow_thickness, at, d, l);
+        s.here = mask;
+        shade(m, &s, p, f, lights, ambient, depth, shadow, shadow_thickness, x, y, d, l);
         for (int c = 0; c < 3; c++) {
             out_diffuse[c] = rl_select(out_diffuse[c], d[c], mask);
             if (HAS_emission)

@@ -45,6 +45,7 @@ typedef struct frame_t {
 } frame_t;
 
 enum { LIGHT_POINT = 0, LIGHT_SPOT = 1, LIGHT_DIRECTIONAL = 2 };
+enum { SHADOW_MARCH = -2 }; /* light_t.shadow: visibility is to be found in the depth buffer */
 
 typedef struct light_t {
     int type;
@@ -52,7 +53,7 @@ typedef struct light_t {
     float direction[3];         /* world, unit: where the light travels */
     float intensity[3];         /* W/sr; directional: W/m2; working space */
     float cos_inner, cos_outer; /* spot: full inside, none outside (cosines of half angles) */
-    int shadow;                 /* plane of the shadow port, -1: visibility is 1 */
+    int shadow;                 /* plane of the shadow port, -1: visibility is 1, SHADOW_MARCH */
     int shadow_thickness;       /* plane of the shadow_thickness port, -1: 0 */
 } light_t;
 

@@ -28,6 +28,7 @@ typedef struct surface_t {
     floatv n[3], w[3], v[3]; /* shading normal; ray per metre of depth; towards the camera, unit */
     widev wide_n[3], nw;     /* the normal again; z n.w */
     floatv z, nv;            /* depth; n.v */
+    intv here;               /* lanes of the material that is shaded */
     floatv albedo[3], thickness, roughness, specular, metallic;
     floatv radius;           /* of curvature, metres; at most 1e6 */
     floatv bent[3][3];       /* the normal that each channel's scattering sees */

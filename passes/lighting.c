@@ -4,11 +4,37 @@
  * Golubev 2018 (transmission at entry and exit, texturing modes, thin and thick slabs), Helix (Beer-Lambert),
  * MJP (scattering as spherical Gaussians: the irradiance is complete, and goes into `lit`), Ramamoorthi and Hanrahan 2001
  * (irradiance of spherical harmonics),
+ * McGuire and Mara 2014 (shadows marched in the depth buffer),
  * Walter 2007 and Heitz 2014 (GGX, height-correlated Smith), Schlick 1994 (Fresnel). */
 #include "passes/shading_rows.h"
 
+typedef struct lighting_params {
+    int32_t shadow_steps;
+    float shadow_thickness_m;
+    float shadow_bias_m;
+    int32_t shadow_jitter;
+    int32_t seed;
+} lighting_params;
+
+static const rl_param params[] = {
+    /* `shadow: screen` marches through the depth buffer: occluders out of the camera's sight or outside of the image cast no
+     * shadow, back faces are not shadowed, and the shadow's thickness is unknown. */
+    P(lighting_params, RL_I32, shadow_steps, 1, 16384, 256, "steps",
+      "shadow: screen: places on the way to the light that are looked at, at most one a pixel",
+      .source = "McGuire and Mara 2014"),
+    P(lighting_params, RL_F32, shadow_thickness_m, 0, 1e6, 0.1, "m",
+      "shadow: screen: how deep occluders are taken to be, along the view axis"),
+    P(lighting_params, RL_F32, shadow_bias_m, 0, 1e3, 0.001, "m",
+      "shadow: screen: how far behind a surface a ray must be to be blocked"),
+    P(lighting_params, RL_BOOL, shadow_jitter, 0, 1, 1, "",
+      "shadow: screen: begin at a random place where shadow_steps does not reach every pixel"),
+    P(lighting_params, RL_I32, seed, 0, 2147483647, 0, "", "of shadow_jitter"),
+};
+RL_PARAMS_MATCH(lighting_params, 5);
+
 static const rl_param profile_keys[] = {
     RL_ROW_SCATTER_DISTANCE(.required_with = "transmission=thin|thick"),
+    RL_ROWS_SCATTER_PARAM,
     RL_ROW_TEXTURING,
     M_ENUM(transmission, "none|thin|thick|beer_lambert", 0, "light that comes through from the back face",
            .source = "Golubev 2018; Helix"),
@@ -72,7 +98,9 @@ const rl_pass rl_pass_lighting = {
     .help = "direct and ambient light: diffuse transmission, specular reflection, translucency",
     .source = "Golubev 2018; Helix; Walter 2007; Heitz 2014",
     .kernel = "lighting.cl",
-    .kernel_prelude = "sg.cl surface.cl sg_shade.cl",
+    .kernel_prelude = "sg.cl surface.cl sg_shade.cl screen_shadow.cl",
+    .params = RL_ARRAY(params),
+    .params_size = sizeof(lighting_params),
     .profile_keys = RL_ARRAY(profile_keys),
     .material_keys = RL_ARRAY(material_keys),
     .shading_keys = RL_ARRAY(shading_keys),

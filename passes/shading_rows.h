@@ -5,11 +5,30 @@
 
 #include "graph/model/pass.h"
 
+/* The words of `param`, burley.c. */
+#define RL_SCATTER_FORMS 5
+extern const rl_form rl_scatter_forms[RL_SCATTER_FORMS];
+
 /* RL_ROW_SCATTER_DISTANCE(.required = true) */
 #define RL_ROW_SCATTER_DISTANCE(...)                                                                         \
     M(RL_RGBF, scatter_distance_mm, 1e-4, 1e4, 0, "mm",                                                      \
       "scattering distance d = 1/s a channel, for Burley's profile",                                         \
-      .source = "Christensen and Burley 2015", .no_default = true, __VA_ARGS__)
+      .source = "Christensen and Burley 2015", .no_default = true, .form_row = "param",                      \
+      .forms = {rl_scatter_forms, RL_SCATTER_FORMS}, __VA_ARGS__)
+/* What the forms of scatter_distance_mm are computed from (burley.c). */
+#define RL_ROWS_SCATTER_PARAM                                                                                \
+    M_ENUM(param, "scatter_distance|mean_free_path|mean_free_path_diffuse|cycles_radius|unreal_dmfp", 0,     \
+           "in which numbers the profile's width is given, see scatter_distance_mm"),                        \
+    M(RL_RGBF, mean_free_path_mm, 1e-6, 1e6, 0, "mm", "mean free path l in the volume, a channel",           \
+      .no_default = true),                                                                                   \
+    M(RL_RGBF, cycles_radius_mm, 1e-6, 1e6, 0, "mm", "radius times scale of a Cycles material, a channel",                \
+      .source = "Blender, Subsurface Scattering node, Christensen-Burley", .no_default = true),              \
+    M(RL_RGBF, diffuse_mean_free_path_mm, 1e-6, 1e6, 0, "mm",                                                \
+      "diffuse mean free path l_d, a channel; in Unreal the product of its colour, distance and world unit scale", \
+      .no_default = true),                                                                                   \
+    M(RL_RGBF, albedo, 0, 1, 0, "ratio",                                                                     \
+      "reflectance A of the surface that the other renderer was told; only for the formulas of param",       \
+      .no_default = true)
 #define RL_ROW_TEXTURING                                                                                     \
     M_ENUM(texturing, "post|pre_post", 0, "albedo on the way out, or its square root on both ways",          \
            .source = "d'Eon 2007")

@@ -20,9 +20,9 @@ extern const rl_pass rl_pass_sss_burley;
 enum { WIDTH = 1920, HEIGHT = 1080, REPEAT = 10 };
 
 static const twin_material materials[3] = {
-    {0, {0, 0, 0},          0, 0, 0, 0},
-    {1, {3.0f, 1.2f, 0.7f}, 0, 0, 0, 0},
-    {1, {6, 5, 3},          1, 0, 0, 0}
+    {0, {0, 0, 0},          0, 0, {0}, 0, 0},
+    {1, {3.0f, 1.2f, 0.7f}, 0, 0, {0}, 0, 0},
+    {1, {6, 5, 3},          1, 0, {0}, 0, 0}
 };
 
 /* As peers/talk_sss.cl has it. */

@@ -32,10 +32,11 @@ static double dot(const double *a, const double *b)
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
+static const double spheres[2][4] = {{-0.25, 0, -2, 0.5}, {0.5, -0.2, -1.7, 0.3}};
+
 /* The nearest hit of a ray; the parameter is the depth, since the ray advances 1 along the view axis. */
 static double hit(const double *from, const double *ray, double *normal, uint32_t *id)
 {
-    static const double spheres[2][4] = {{-0.25, 0, -2, 0.5}, {0.5, -0.2, -1.7, 0.3}};
     double best = INFINITY;
     for (int s = 0; s < 2; s++) {
         double o[3];
@@ -58,6 +59,25 @@ static double hit(const double *from, const double *ray, double *normal, uint32_
         normal[1] = 1;
     }
     return best;
+}
+
+uint32_t scene_first(const double *from, const double *ray, double end)
+{
+    double normal[3];
+    uint32_t id = 0;
+    return hit(from, ray, normal, &id) < end ? id : 0;
+}
+
+uint32_t scene_inside(const double *p)
+{
+    for (int s = 0; s < 2; s++) {
+        double o[3];
+        for (int i = 0; i < 3; i++)
+            o[i] = p[i] - spheres[s][i];
+        if (dot(o, o) < spheres[s][3] * spheres[s][3])
+            return s ? 3 : 1;
+    }
+    return p[1] < -0.6 ? 2 : 0;
 }
 
 static void view_ray(const scene_camera *c, int x, int y, double *ray)

@@ -41,6 +41,16 @@ static void add_param(rl_str *s, const rl_param *row, const void *params)
         rl_str_printf(s, "#define P_%s %g\n", row->name, shade_from_word(row->type, word));
 }
 
+/* The run's own, or the defaults. */
+static const void *params_of(const shade_run *run)
+{
+    static uint32_t words[SHADE_WORDS];
+    if (run->params)
+        return run->params;
+    shade_params_default(run->pass, words);
+    return words;
+}
+
 static void add_prelude(rl_str *s, const shade_run *run)
 {
     const rl_pass *pass = run->pass;
@@ -51,7 +61,12 @@ static void add_prelude(rl_str *s, const shade_run *run)
         rl_str_add(s, "} params_t;\n");
     }
     for (size_t r = 0; r < pass->params.n; r++)
-        add_param(s, &pass->params.rows[r], run->params);
+        add_param(s, &pass->params.rows[r], params_of(run));
+    int march = 0;
+    for (int i = 0; i < run->frame.lights && pass->lights; i++)
+        march |= run->lights[i].shadow == SHADOW_MARCH;
+    if (pass->lights)
+        rl_str_printf(s, "#define LIGHTS_MARCH %d\n", march);
     rl_str_add(s, "typedef struct material_t { int has_profile; ");
     shade_each_row(run->materials, add_row, s);
     rl_str_add(s, "} material_t;\n");
@@ -206,7 +221,7 @@ static bool add_arguments(launch *l, const shade_run *run)
     for (size_t i = 0; i < pass->ports.n; i++)
         if (!add_port(l, &run->frame, run->images[i]))
             return false;
-    if (pass->params.n && !add_buffer(l, run->params, pass->params_size))
+    if (pass->params.n && !add_buffer(l, params_of(run), pass->params_size))
         return false;
     if (!add_buffer(l, &run->frame, sizeof run->frame) || !add_materials(l, run->materials))
         return false;

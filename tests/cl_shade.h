@@ -26,7 +26,7 @@ typedef struct shade_materials {
 typedef struct shade_run {
     const rl_pass *pass;
     frame_t frame;
-    const void *params;
+    const void *params; /* NULL = the defaults */
     const shade_image *images[SHADE_PORTS]; /* in port order; NULL = absent */
     bool phase4[SHADE_PORTS];               /* any_layout outputs: ask the kernel for RL_PHASE4 */
     const shade_materials *materials;

@@ -13,6 +13,7 @@ typedef struct twin_material {
     int32_t has_profile;
     float scatter_distance_mm[3];
     int32_t texturing, border;
+    int32_t param[13]; /* what scatter_distance_mm may be derived from: kernels do not read it */
     int32_t diffuse, exit_transmission;
 } twin_material;
 

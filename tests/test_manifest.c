@@ -565,7 +565,7 @@ static void test_bad_lights(void **state)
         {"{type: point, positon: [0, 0, 0]}",                                                 "light 'k' has no key 'positon'; did you mean 'position'? "
                                               "known: angle, blend, candela, color, colorspace, "
                                               "direction, efficacy, enabled, exposure, intensity, "
-                                              "irradiance, lumen, lux, position, shadow, space, type"                },
+                                              "irradiance, lumen, lux, position, shadow, space, temperature, tint, type"                },
         {"bright",                                                                            "light 'k': expected a map, found the text 'bright'"                },
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {

@@ -64,7 +64,7 @@ static rl_program *form_build(const form *f, const char *what)
     rl_error err = {0};
     rl_program *program = NULL;
     rl_plan_node node = {.node = 0, .buffers = f->buffers};
-    if (rl_kernel_text(&arena, &f->plan, &node, &text, &err) ||
+    if (rl_kernel_text(&arena, &f->plan, &node, true, &text, &err) ||
         rl_program_build(device, f->pass->name, rl_str_text(&text), true, &program, &err))
         fail_msg("%s (%s): %s:%d:%d: %s", f->pass->name, what, err.file, err.line, err.column, err.text);
     rl_str_free(&text);

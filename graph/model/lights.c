@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "graph/base/text.h"
+#include "graph/model/temperature.h"
 
 static const double pi = 3.14159265358979323846;
 
@@ -60,6 +61,23 @@ static rl_code read_amount(const rl_value *v, rl_light_spec *l, rl_error *err)
         code = read_rgb(color, "color", tint, err);
     for (int c = 0; c < 3; c++)
         l->amount[c] *= tint[c];
+    return code;
+}
+
+static rl_code read_temperature(const rl_value *v, rl_light_spec *l, rl_error *err)
+{
+    const rl_value *temperature = rl_value_get(v, "temperature"), *tint = rl_value_get(v, "tint");
+    if (tint && !temperature)
+        return rl_fail(err, RL_E_CONFIG, tint->where, "light '%s': 'tint' is off the locus of a 'temperature'; give one",
+                       l->name);
+    if (!temperature)
+        return RL_OK;
+    if (rl_value_get(v, "color"))
+        return rl_fail(err, RL_E_CONFIG, temperature->where,
+                       "light '%s' has both color and temperature; give one", l->name);
+    rl_code code = rl_value_number(temperature, "temperature", RL_KELVIN_LEAST, RL_KELVIN_MOST, &l->kelvin, err);
+    if (!code && tint)
+        code = rl_value_number(tint, "tint", -RL_DUV_MOST, RL_DUV_MOST, &l->duv, err);
     return code;
 }
 
@@ -165,7 +183,7 @@ static rl_code read_light(const rl_entry *e, double metres, rl_light_spec *l, rl
 {
     static const char *const known[] = {"type",       "position", "direction", "angle", "blend", "intensity",
                                         "irradiance", "candela",  "lumen",     "lux",   "color", "colorspace",
-                                        "efficacy",   "exposure", "enabled",   "space", "shadow"};
+                                        "efficacy",   "exposure", "enabled",   "space", "shadow", "temperature", "tint"};
     const rl_value *v = e->value, *type = rl_value_get(v, "type");
     int t = 0;
     rl_str what = {0};
@@ -193,6 +211,8 @@ static rl_code read_light(const rl_entry *e, double metres, rl_light_spec *l, rl
         code = read_spot(v, l, err);
     if (!code)
         code = read_amount(v, l, err);
+    if (!code)
+        code = read_temperature(v, l, err);
     return code ? code : read_shadow(v, l, err);
 }
 

@@ -5,7 +5,12 @@
  *     sun: {type: directional, direction: […], irradiance: 3, color: [1, 0.9, 0.8]}       W/m²
  *
  * Photometric keys, at `efficacy` lm/W (683 unless given): candela and lumen for point and spot, lux for
- * directional. Every amount is one number or three; `color` multiplies it, `exposure` (stops) too. */
+ * directional. Every amount is one number or three; `color` multiplies it, `exposure` (stops) too.
+ *
+ *     bulb: {type: point, position: …, candela: 80, temperature: 2700, tint: 0.003}
+ *
+ * `temperature` in place of `color`: a black body's of 1000 … 40000 K, `tint` off its locus by -0.05 … 0.05 in CIE 1960
+ * u, v (positive is greener; D65 is 6504 K with 0.0032). It leaves the luminance as it is (temperature.h). */
 #ifndef RL_MODEL_LIGHTS_H
 #define RL_MODEL_LIGHTS_H
 
@@ -43,6 +48,8 @@ typedef struct rl_light_spec {
     double blend;         /* spot: 0 hard … 1 soft from the axis on */
     rl_light_unit unit;
     double amount[3];       /* in `unit`, times color; r, g, b; >= 0 */
+    double kelvin;          /* of the colour that the amounts have besides; 0 = none */
+    double duv;             /* tint of that colour, see temperature.h */
     double efficacy;        /* lm/W, > 0 */
     double exposure;        /* stops */
     const char *colorspace; /* of the amounts; default "lin_rec709" */
@@ -60,7 +67,7 @@ typedef struct rl_lights {
 rl_code rl_lights_parse(rl_arena *arena, const rl_value *v, double metres, rl_lights *out, rl_error *err);
 
 /* What the kernels see, but in the light's own colour space: W/sr for point and spot, W/m² for directional,
- * exposure applied.
+ * exposure applied, the temperature's colour not: rl_kelvin_rgb makes its factors for that space.
  *     candela: I = Iv/efficacy     lux: E = Ev/efficacy
  *     lumen, point: I = F/(4·pi·efficacy)
  *     lumen, spot:  I = F/(omega·efficacy), omega = 2·pi·(1 - cos(angle/2)): the flux that the cone would

@@ -194,9 +194,11 @@ static void print_light(const rl_light_spec *l, double unit, rl_str *s)
         double value, usual;
     } numbers[] = {
         {"efficacy", l->efficacy, 683},
-        {"exposure", l->exposure, 0  }
+        {"exposure", l->exposure, 0  },
+        {"temperature", l->kelvin, 0},
+        {"tint", l->duv, 0},
     };
-    for (int i = 0; i < 2; i++)
+    for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
         if (numbers[i].value != numbers[i].usual) {
             rl_str_printf(s, ", %s: ", numbers[i].key);
             print_number(s, numbers[i].value);

@@ -1,4 +1,5 @@
 /* Profiles, shading and materials, from their maps to the table. */
+#include "graph/model/materials_forms.h"
 #include "graph/model/materials_ids.h"
 
 #include <string.h>
@@ -131,7 +132,8 @@ static rl_code check_required(reader *r, const rl_value *profile, const char *na
         for (size_t k = 0; k < r->used[i]->profile_keys.n; k++) {
             const rl_param *row = &r->used[i]->profile_keys.rows[k];
             bool asked = asks_for(r, row->required_with, entry);
-            if ((row->required || asked) && !rl_value_get(profile, row->name))
+            if ((row->required || asked) && !rl_value_get(profile, row->name) &&
+                !rl_forms_derived(r->m, row, entry))
                 return rl_fail(r->err, RL_E_CONFIG, where, "profile '%s' needs '%s' for pass %s%s%s%s: %s", name,
                                row->name, r->used[i]->name, asked ? " (" : "",
                                asked ? row->required_with : "", asked ? ")" : "", row->help);
@@ -147,8 +149,14 @@ static rl_code check_profiles(reader *r)
     char *scratch = rl_arena_alloc(r->arena, r->m->entry_bytes);
     if (!scratch)
         return rl_fail_memory(r->err, r->m->entry_bytes);
-    for (size_t i = 0; !code && r->profiles && i < r->profiles->n; i++)
-        code = read_group(r, r->profiles->entries[i].value, "profile", r->profiles->entries[i].key, scratch);
+    for (size_t i = 0; !code && r->profiles && i < r->profiles->n; i++) {
+        const rl_entry *profile = &r->profiles->entries[i];
+        for (size_t k = 0; k < r->m->n_rows; k++)
+            rl_param_default(r->m->rows[k].param, scratch + r->m->rows[k].offset);
+        code = read_group(r, profile->value, "profile", profile->key, scratch);
+        if (!code)
+            code = rl_forms_apply(r->m, profile->value, profile->key, scratch, r->err);
+    }
     return code;
 }
 
@@ -184,6 +192,8 @@ static rl_code read_profile(reader *r, unsigned dense, const rl_value *v)
         return rl_value_wrong(v, "profile", "the name of a profile, or a profile's map", r->err);
     }
     rl_code code = read_group(r, profile, "profile", name, entry_at(r, dense));
+    if (!code)
+        code = rl_forms_apply(r->m, profile, name, entry_at(r, dense), r->err);
     if (!code)
         code = check_required(r, profile, name, entry_at(r, dense), where);
     if (code)

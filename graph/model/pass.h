@@ -48,6 +48,20 @@ typedef struct rl_params {
     size_t n;
 } rl_params;
 
+/* One way to give the value of a profile row in other terms, chosen by a word of another row (.form_row). */
+typedef struct rl_form {
+    const char *word;    /* of the .form_row */
+    const char *from[2]; /* the profile rows that it is computed from, one or two; no other form's may be given */
+    double (*derive)(const double from[2]); /* of one channel; pure. NULL: the row is given itself (.from is its own name) */
+    const char *formula; /* one line for people */
+    const char *source;  /* paper, equation, program */
+} rl_form;
+
+typedef struct rl_forms {
+    const rl_form *rows;
+    size_t n;
+} rl_forms;
+
 /* A row of a table of parameters, or of profile, material or shading keys. */
 typedef struct rl_param {
     const char *name;    /* as in YAML and, the same, as a field of the struct */
@@ -67,6 +81,8 @@ typedef struct rl_param {
     const char *needed_by; /* profile rows with no_default, "diffuse: sg": required of the profiles of materials with that
                               shading word (graph.h), */
     const char *instead;   /* unless the profile gives this other row; or NULL */
+    const char *form_row; /* profile rows of numbers with no_default: the row whose word says which of .forms is given */
+    rl_forms forms;      /* one for each of that row's words; what they derive must be within min … max */
     rl_params list;      /* RL_ROWS: the keys of an element, none of them RL_ROWS */
     double most_sum;     /* float rows of a list, > 0: what the elements add up to at most, each channel (+1e-6) */
 } rl_param;

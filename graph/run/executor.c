@@ -69,7 +69,7 @@ static void build_one(void *ctx, int i)
     if ((size_t)i < x->plan->n_nodes) {
         const rl_plan_node *n = &x->plan->nodes[i];
         const rl_graph_node *g = &x->plan->graph->nodes[n->node];
-        if (!rl_kernel_text(&arena, x->plan, n, &text, err))
+        if (!rl_kernel_text(&arena, x->plan, n, x->march, &text, err))
             rl_program_build(x->device, g->name, rl_str_text(&text), false, &x->nodes[n->node].program, err);
         if (err->code == RL_E_BUILD && !err->file[0])
             rl_fail(err, RL_E_BUILD, g->where, "pass '%s' (%s) does not build", g->name, g->pass->name);
@@ -104,7 +104,7 @@ static rl_code build_programs(rl_executor *x, int threads, rl_error *err)
     return code;
 }
 
-rl_code rl_executor_new(rl_device *device, const rl_plan *plan, const rl_materials *materials, int threads,
+rl_code rl_executor_new(rl_device *device, const rl_plan *plan, const rl_materials *materials, bool march, int threads,
                         const rl_log *log, rl_executor **out, rl_error *err)
 {
     *out = NULL;
@@ -114,6 +114,7 @@ rl_code rl_executor_new(rl_device *device, const rl_plan *plan, const rl_materia
     x->device = device;
     x->plan = plan;
     x->material_table = materials;
+    x->march = march;
     x->log = log;
     x->nodes = rl_arena_array(&x->arena, plan->graph->n_nodes + 1, sizeof *x->nodes);
     x->slots = rl_arena_array(&x->arena, plan->n_slots + 1, sizeof *x->slots);

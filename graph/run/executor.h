@@ -17,8 +17,9 @@ typedef struct rl_executor rl_executor;
 /* The buffers that belong to one frame in flight: what its source fills and what its writers read. */
 typedef struct rl_frame_buffers rl_frame_buffers;
 
-/* Builds the programs of all live nodes, on up to `threads` threads. Keeps pointers to all arguments. */
-rl_code rl_executor_new(rl_device *device, const rl_plan *plan, const rl_materials *materials, int threads,
+/* Builds the programs of all live nodes, on up to `threads` threads. Keeps pointers to all arguments. `march`: some light
+ * may have SHADOW_MARCH; without, its code is left out and such a light has no shadow. */
+rl_code rl_executor_new(rl_device *device, const rl_plan *plan, const rl_materials *materials, bool march, int threads,
                         const rl_log *log, rl_executor **out, rl_error *err);
 void rl_executor_free(rl_executor **executor);
 

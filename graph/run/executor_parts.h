@@ -15,6 +15,7 @@ struct rl_executor {
     rl_device *device;
     const rl_plan *plan;
     const rl_materials *material_table;
+    bool march; /* programs of passes with .lights know of SHADOW_MARCH */
     const rl_log *log;
     rl_node_state *nodes; /* [graph->n_nodes] */
     rl_program *convert;

@@ -87,7 +87,8 @@ const rl_exr_channel *rl_exr_channel_named(const rl_exr_part *part, const char *
  *
  * As floats, half and float come as they are and uint as the number (one that a float cannot hold is
  * RL_E_DATA). NaN and infinities become 0 and are counted; with `replace_inf`, +Inf becomes inf_value instead
- * and is not counted (renderers write it where depth is empty).
+ * and is not counted (renderers write it where depth is empty); with `keep_nonfinite` all
+ * of them stay and none is counted.
  *
  * As ids, uint comes as it is; half and float must be integral and within int32 or uint32, else RL_E_DATA
  * names the pixel and the value. A negative id keeps its 32 bits. */
@@ -98,6 +99,7 @@ typedef struct rl_exr_plane {
     size_t stride; /* elements from a row to the next, >= width */
     bool replace_inf;
     float inf_value;
+    bool keep_nonfinite;
     uint64_t nonfinite; /* result: how many values were replaced by 0; the same for every thread count */
 } rl_exr_plane;
 
@@ -115,7 +117,8 @@ typedef struct rl_exr_rows {
 rl_code rl_exr_read(const rl_exr *file, int part, rl_exr_plane *planes, size_t n_planes,
                     const rl_exr_rows *rows, rl_pool *pool, rl_error *err);
 
-/* The most that rl_exr_read allocates for a part with a pool of so many threads; 0 when the header is broken. */
+/* The most that rl_exr_read allocates for a part with a pool of so many threads; 0 when the header is broken.
+ */
 uint64_t rl_exr_read_scratch(const rl_exr *file, int part, int threads);
 
 /* ---- attributes ---- */

@@ -59,6 +59,18 @@ static rl_code fail_value(const job *j, const rl_exr_plane *plane, rl_exr_pixel 
                         plane->ids ? "a 32-bit id" : "exact as a float");
 }
 
+/* Half and float without replacing anything. */
+static void store_as_is(rl_exr_pixel type, const uint8_t *raw, float *out, size_t n)
+{
+    if (type == RL_EXR_FLOAT)
+        memcpy(out, raw, 4 * n);
+    for (size_t i = 0; type == RL_EXR_HALF && i < n; i++) {
+        uint16_t half;
+        memcpy(&half, raw + 2 * i, 2);
+        out[i] = rl_exr_half_value(half);
+    }
+}
+
 /* One row of one channel, plain samples in file format, into one plane. */
 static rl_code store_row(worker *w, int p, rl_exr_pixel type, const uint8_t *raw, const place *at, int y,
                          rl_error *err)
@@ -76,6 +88,8 @@ static rl_code store_row(worker *w, int p, rl_exr_pixel type, const uint8_t *raw
             good = rl_exr_float_to_id(raw, plane->ids + to, n);
     } else if (type == RL_EXR_UINT) {
         good = rl_exr_uint_to_float(raw, plane->floats + to, n);
+    } else if (plane->keep_nonfinite) {
+        store_as_is(type, raw, plane->floats + to, n);
     } else if (type == RL_EXR_HALF) {
         w->nonfinite[p] += w->kernels->half_to_float(raw, plane->floats + to, n, &fix);
     } else {

@@ -93,8 +93,8 @@ rl_code rl_session_prepare(rl_session *s, rl_error *err)
     rl_code code = s->device ? RL_OK : rl_device_open(s->options.device, s->options.threads, s->log, &s->device, err);
     for (size_t i = 0; i < s->n_sequences && !code; i++)
         if (!s->sequences[i].executor)
-            code = rl_executor_new(s->device, s->sequences[i].plan, s->sequences[i].materials, s->threads, s->log,
-                                   &s->sequences[i].executor, err);
+            code = rl_executor_new(s->device, s->sequences[i].plan, s->sequences[i].materials, s->sequences[i].march,
+                                   s->threads, s->log, &s->sequences[i].executor, err);
     return code;
 }
 

@@ -23,7 +23,7 @@ typedef struct rl_active_light {
     const rl_light_spec *spec;
     const rl_layer *shadow, *thickness; /* the capture's layers for it, or NULL */
     int shadow_plane, thickness_plane;  /* of the ports, or -1 */
-    float to_working[9];                /* from the colour space of its amounts, rows listed */
+    float to_working[9];                /* from the colour space of its amounts, rows listed; its temperature's colour is in it */
 } rl_active_light;
 
 /* One capture with all that depends on it. Constant after rl_session_open, except for the executor. */
@@ -32,6 +32,7 @@ typedef struct rl_sequence {
     rl_frames frames; /* to be processed, in order */
     rl_active_light *lights;
     size_t n_lights;
+    bool march; /* one of them has `shadow: screen` */
     light_t *light_values; /* of the frame that runs */
     rl_light_planes shadow, thickness;
     const rl_materials *materials;

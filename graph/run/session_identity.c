@@ -80,7 +80,7 @@ static rl_code hash_kernels(const rl_sequence *q, uint64_t *out, rl_error *err)
         rl_pass_input in = {.pass = g->pass, .params = g->params, .materials = m};
         rl_tables tables = {0};
         rl_str text = {0};
-        code = rl_kernel_text(&arena, q->plan, &q->plan->nodes[i], &text, err);
+        code = rl_kernel_text(&arena, q->plan, &q->plan->nodes[i], q->march, &text, err);
         if (!code && g->pass->tables)
             code = g->pass->tables(&in, &arena, &tables, err);
         h = add_bytes(add_text(h, rl_str_text(&text)), g->params, g->pass->params_size);

@@ -3,6 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "graph/model/temperature.h"
 #include "graph/run/session.h"
 
 static const rl_light_spec *find_light(const rl_lights *lights, const char *name)
@@ -57,18 +58,40 @@ static rl_code no_such_shadow(const rl_manifest *m, const rl_light_spec *light, 
 static rl_code bind_shadow(const rl_session *s, const rl_manifest *m, rl_active_light *a, rl_error *err)
 {
     const rl_light_spec *light = a->spec;
-    if (light->shadow == RL_SHADOW_NONE)
+    if (light->shadow != RL_SHADOW_LAYER)
         return RL_OK;
-    if (light->shadow == RL_SHADOW_SCREEN)
-        return rl_fail(err, RL_E_CONFIG, light->where,
-                       "light '%s': 'shadow: screen' is not supported by this version; expected a layer's name or none",
-                       light->name);
     a->shadow = light_layer(m, "shadow", light->shadow_layer);
     a->thickness = light_layer(m, "shadow_thickness", light->shadow_layer);
     if (!a->shadow && light->shadow_named)
         return no_such_shadow(m, light, err);
     if (a->shadow)
         warn_stale(s, m, light);
+    return RL_OK;
+}
+
+/* The matrix of the light's colour space, with the colour of its temperature in it: factors for the channels of that
+ * space, which the working space tells from linear Rec.709. */
+static rl_code light_color(const rl_session *s, const rl_light_spec *spec, float m[9], rl_error *err)
+{
+    rl_code code = rl_session_light_matrix(s, spec->colorspace, spec->where, m, err);
+    if (code || !(spec->kelvin > 0))
+        return code;
+    float rec709[9];
+    double to_working[9], from_working[9], to_rec709[9] = {0}, factor[3];
+    code = rl_session_light_matrix(s, "lin_rec709", spec->where, rec709, err);
+    if (code)
+        return code;
+    for (int i = 0; i < 9; i++)
+        to_working[i] = (double)rec709[i];
+    if (!rl_invert3(to_working, from_working))
+        return rl_fail(err, RL_E_CONFIG, spec->where,
+                       "light '%s' has a temperature, whose colour the working space cannot tell apart", spec->name);
+    for (int i = 0; i < 9; i++)
+        for (int k = 0; k < 3; k++)
+            to_rec709[i] += from_working[i / 3 * 3 + k] * (double)m[3 * k + i % 3];
+    rl_kelvin_rgb(spec->kelvin, spec->duv, to_rec709, factor);
+    for (int i = 0; i < 9; i++)
+        m[i] = (float)((double)m[i] * factor[i % 3]);
     return RL_OK;
 }
 
@@ -96,9 +119,10 @@ rl_code rl_session_lights(rl_session *s, rl_sequence *q, rl_error *err)
         rl_active_light *a = &q->lights[q->n_lights++];
         a->spec = spec;
         a->shadow_plane = a->thickness_plane = -1;
+        q->march |= spec->shadow == RL_SHADOW_SCREEN;
         code = bind_shadow(s, m, a, err);
         if (!code)
-            code = rl_session_light_matrix(s, spec->colorspace, spec->where, a->to_working, err);
+            code = light_color(s, spec, a->to_working, err);
         if (a->shadow)
             shadow[a->shadow_plane = q->shadow.n++] = a->shadow;
         if (a->thickness)
@@ -120,7 +144,8 @@ void rl_session_light_values(const rl_sequence *q, const camera_t *camera, light
     for (size_t i = 0; i < q->n_lights; i++) {
         const rl_active_light *a = &q->lights[i];
         const rl_light_spec *spec = a->spec;
-        light_t l = {.shadow = a->shadow_plane, .shadow_thickness = a->thickness_plane};
+        light_t l = {.shadow = spec->shadow == RL_SHADOW_SCREEN ? SHADOW_MARCH : a->shadow_plane,
+                     .shadow_thickness = a->thickness_plane};
         l.type = spec->type == RL_LIGHT_POINT  ? LIGHT_POINT
                  : spec->type == RL_LIGHT_SPOT ? LIGHT_SPOT
                                                : LIGHT_DIRECTIONAL;

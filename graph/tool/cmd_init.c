@@ -67,6 +67,14 @@ static void add_light(rl_str *out, const rl_light_spec *l)
         rl_str_add(out, ", efficacy: ");
         add_number(out, l->efficacy);
     }
+    if (l->kelvin > 0) {
+        rl_str_add(out, ", temperature: ");
+        add_number(out, l->kelvin);
+    }
+    if (l->duv != 0) {
+        rl_str_add(out, ", tint: ");
+        add_number(out, l->duv);
+    }
     if (strcmp(l->colorspace, "lin_rec709")) {
         rl_str_add(out, ", colorspace: ");
         add_text(out, l->colorspace);

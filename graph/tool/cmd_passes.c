@@ -89,6 +89,16 @@ static void print_ports(const rl_pass *pass, rl_str *out)
     }
 }
 
+/* In which other terms the value of a row may be given. */
+static void print_forms(const rl_param *row, int indent, rl_str *out)
+{
+    for (size_t i = 0; i < row->forms.n; i++) {
+        const rl_form *form = &row->forms.rows[i];
+        rl_str_printf(out, "%*s%s: %s needs %s%s%s: %s; %s\n", indent, "", row->form_row, form->word, form->from[0],
+                      form->from[1] ? ", " : "", form->from[1] ? form->from[1] : "", form->formula, form->source);
+    }
+}
+
 /* `indent` columns from the left; the keys of a list below it. */
 static void print_each(rl_params rows, int indent, rl_str *out)
 {
@@ -101,6 +111,7 @@ static void print_each(rl_params rows, int indent, rl_str *out)
         if (row->source)
             rl_str_printf(out, "; %s", row->source);
         rl_str_add(out, "\n");
+        print_forms(row, indent + width + 4, out);
         if (row->list.n)
             print_each(row->list, indent + width + 6, out);
     }
@@ -145,6 +156,18 @@ static json_t *default_json(const rl_param *row)
     return json;
 }
 
+static json_t *forms_json(const rl_param *row)
+{
+    json_t *list = json_array();
+    for (size_t i = 0; i < row->forms.n; i++) {
+        const rl_form *form = &row->forms.rows[i];
+        json_array_append_new(list, json_pack("{s:s, s:[s, s*], s:s, s:s}", row->form_row, form->word, "from",
+                                              form->from[0], form->from[1], "formula", form->formula, "source",
+                                              form->source));
+    }
+    return list;
+}
+
 static json_t *rows_json(rl_params rows)
 {
     json_t *list = json_array();
@@ -158,6 +181,8 @@ static json_t *rows_json(rl_params rows)
             json_object_set_new(object, "words", json_string(row->words));
         if (object && row->type != RL_ENUM && row->type != RL_BOOL)
             json_object_set_new(object, "range", json_pack("[f, f]", row->min, row->max));
+        if (object && row->forms.n)
+            json_object_set_new(object, "forms", forms_json(row));
         if (object && row->list.n)
             json_object_set_new(object, "keys", rows_json(row->list));
         json_array_append_new(list, object);

@@ -13,6 +13,12 @@ static const command commands[] = {
       "outputs. A file under its final name is whole. A frame that fails does not stop\n"
       "the others.\n"},
      rl_cmd_run},
+    {{"diff", RL_CMD_DIFF, "A B", "compare an image with a reference",
+      "Compares image B with the reference A and prints mean, median, 95th percentile\n"
+      "and maximum of a metric. EXR files: channels R, G, B, or the only layer. A file\n"
+      "of 8 or 16 bits is taken as sRGB-encoded, others as linear Rec. 709. FLIP uses\n"
+      "67.02 pixels a degree. NaN in an image is an error.\n"},
+     rl_cmd_diff},
     {{"check", RL_CMD_CHECK, "PIPELINE", "validate everything without processing a pixel",
       "Reads the pipeline, opens the headers of the capture, makes the plan and\n"
       "compiles the kernels. Writes nothing.\n"},

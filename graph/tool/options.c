@@ -30,7 +30,7 @@ typedef struct option {
 
 #define SHARED         (RL_CMD_RUN | RL_CMD_CHECK | RL_CMD_PLAN)
 #define TIMED          (SHARED | RL_CMD_BENCH)
-#define EVERY          (TIMED | RL_CMD_INIT | RL_CMD_INSPECT | RL_CMD_PASSES | RL_CMD_DEVICES)
+#define EVERY          (TIMED | RL_CMD_INIT | RL_CMD_INSPECT | RL_CMD_PASSES | RL_CMD_DEVICES | RL_CMD_DIFF)
 #define AT(field)      .at = offsetof(rl_arguments, field)
 #define LIST_AT(field) AT(run.field), .count = offsetof(rl_arguments, run.n_##field)
 
@@ -75,7 +75,7 @@ static const option options[] = {
     {"ocio", "FILE", TIMED, TEXT, AT(run.ocio),
      .help = "OpenColorIO config; default: the pipeline's, else\n"
              "$OCIO, else relit's own"},
-    {"threads", "N", TIMED, INTEGER, AT(run.threads), .min = 1, .max = 1024,
+    {"threads", "N", TIMED | RL_CMD_DIFF, INTEGER, AT(run.threads), .min = 1, .max = 1024,
      .help = "how many to use; default: one a processor"},
     {"device", "N|cpu|gpu", TIMED | RL_CMD_DEVICES, TEXT, AT(run.device),
      .help = "OpenCL device, by number (see `relit devices`) or\n"
@@ -85,7 +85,7 @@ static const option options[] = {
              "default: no limit"},
     {"format", "WORD", RL_CMD_PLAN, WORD, AT(format), .words = "text|dot|svg|json",
      .help = "text (default), dot, svg or json"},
-    {"json", NULL, TIMED | RL_CMD_PASSES | RL_CMD_DEVICES, FLAG, AT(json),
+    {"json", NULL, TIMED | RL_CMD_PASSES | RL_CMD_DEVICES | RL_CMD_DIFF, FLAG, AT(json),
      .help = "print JSON on stdout (run: an object a frame, each\n"
              "on its line)"},
     {"markdown", NULL, RL_CMD_PASSES, FLAG, AT(markdown),
@@ -93,6 +93,15 @@ static const option options[] = {
     {"size", "WxH", RL_CMD_BENCH, SIZE, AT(size),
      .help = "time frames of that size: the capture's pixels\n"
              "repeated or left out; default: as they are"},
+    {"metric", "NAME", RL_CMD_DIFF, TEXT, AT(metric),
+     .help = "flip, hdrflip, psnr, ssim, rmse or max; default:\n"
+             "flip for 8-bit files, hdrflip for float"},
+    {"heatmap", "F.png", RL_CMD_DIFF, TEXT, AT(heatmap),
+     .help = "write the metric of every pixel as a picture"},
+    {"fail-over", "[METRIC.STAT=]X", RL_CMD_DIFF, LIST, AT(fail_over),
+     .count = offsetof(rl_arguments, n_fail_over),
+     .help = "exit with 3 when the mean, or flip.p95 or such, is\n"
+             "over X (psnr and ssim: under X); may be repeated"},
     {"trace", "F.json", RL_CMD_RUN, TEXT, AT(trace),
      .help = "write what ran when, for ui.perfetto.dev or\n"
              "chrome://tracing"},
@@ -192,8 +201,8 @@ static rl_code take_size(const parser *p, const option *o, const char *value, in
     char *head = rl_arena_strndup(p->arena, value, n);
     if (!head)
         return rl_fail_memory(p->err, n);
-    if (value[n] != 'x' || !rl_parse_int(head, &width) || !rl_parse_int(value + n + 1, &height) || width < 1 ||
-        height < 1 || width > 65536 || height > 65536)
+    if (value[n] != 'x' || !rl_parse_int(head, &width) || !rl_parse_int(value + n + 1, &height) ||
+        width < 1 || height < 1 || width > 65536 || height > 65536)
         return wrong(p, o, "WxH in pixels, such as 1920x1080", value);
     out[0] = (int)width;
     out[1] = (int)height;
@@ -333,10 +342,13 @@ static rl_code parse_operand(const parser *p, const char *word)
                             word, p->command->name);
     if (!p->command->operand)
         return rl_fail_file(p->err, RL_E_USAGE, p->place, "takes no argument, found '%s'", word);
-    if (p->out->operand)
+    bool two = strchr(p->command->operand, ' ');
+    if (two && p->out->second)
+        return rl_fail_file(p->err, RL_E_USAGE, p->place, "takes two files, found a third, '%s'", word);
+    if (!two && p->out->operand)
         return rl_fail_file(p->err, RL_E_USAGE, p->place, "takes one %s, found '%s' and '%s'",
                             p->command->operand, p->out->operand, word);
-    p->out->operand = word;
+    *(p->out->operand ? &p->out->second : &p->out->operand) = word;
     return RL_OK;
 }
 
@@ -359,11 +371,16 @@ rl_code rl_arguments_parse(rl_arena *arena, const rl_commands *commands, const r
             code = parse_operand(&p, argv[i]);
     }
     out->run.on_missing = (rl_on_missing)out->on_missing;
-    if (!code && !out->help && !out->operand && command->operand && command->operand[0] != '[')
+    if (!code && !out->help && !out->operand && command->operand && command->operand[0] != '[' &&
+        !strchr(command->operand, ' '))
         code = rl_fail_file(err, RL_E_USAGE, p.place, "needs a %s, see `relit %s --help`", command->operand,
                             command->name);
     if (!code && out->run.preroll && !out->run.shard[1])
-        code = rl_fail_file(err, RL_E_USAGE, p.place, "--preroll is the warm-up of a shard: give --shard I/N too");
+        code = rl_fail_file(err, RL_E_USAGE, p.place,
+                            "--preroll is the warm-up of a shard: give --shard I/N too");
+    if (!code && !out->help && command->operand && strchr(command->operand, ' ') && !out->second)
+        code = rl_fail_file(err, RL_E_USAGE, p.place, "needs two files, %s, see `relit %s --help`",
+                            command->operand, command->name);
     if (!code && out->quiet && out->verbose)
         code = rl_fail_file(err, RL_E_USAGE, p.place, "--quiet and --verbose exclude each other");
     return code;
@@ -395,6 +412,8 @@ enum { COMMAND_COLUMN = 20, OPTION_COLUMN = 26 };
 static void add_row(rl_str *s, int column, const char *left, const char *help)
 {
     rl_str_printf(s, "  %-*s", column - 2, left);
+    if (strlen(left) > (size_t)column - 4)
+        rl_str_printf(s, "\n%*s", column, "");
     for (const char *at = help; at; at = strchr(at, '\n') ? strchr(at, '\n') + 1 : NULL)
         rl_str_printf(s, "%*s%.*s\n", at == help ? 0 : column, "", (int)strcspn(at, "\n"), at);
 }
@@ -418,6 +437,7 @@ void rl_help_overview(const rl_commands *commands, rl_str *out)
                     "  0  all done\n"
                     "  1  a frame failed; the others were written\n"
                     "  2  the command line, the pipeline or the capture is wrong; nothing was written\n"
+                    "  3  images differ by more than --fail-over allows\n"
                     "  SIGINT and SIGTERM stop a run by that signal, after the frames in flight\n");
 }
 

@@ -18,14 +18,15 @@ typedef enum rl_command_bit {
     RL_CMD_INSPECT = 16,
     RL_CMD_PASSES = 32,
     RL_CMD_DEVICES = 64,
-    RL_CMD_BENCH = 128
+    RL_CMD_BENCH = 128,
+    RL_CMD_DIFF = 256
 } rl_command_bit;
 
 /* A command as the parser and the help see it. */
 typedef struct rl_command_info {
     const char *name;
     rl_command_bit bit;
-    const char *operand; /* "PIPELINE", "[NAME]" (may be left out), or NULL: takes none */
+    const char *operand; /* "PIPELINE", "[NAME]" (may be left out), "A B" (two), or NULL: takes none */
     const char *help;    /* one line */
     const char *more;    /* paragraphs for `relit NAME --help`, lines under 80 columns, or NULL */
 } rl_command_info;
@@ -40,10 +41,14 @@ typedef enum rl_plan_word { RL_WORD_TEXT, RL_WORD_DOT, RL_WORD_SVG, RL_WORD_JSON
 /* What was asked for. Lists live in the arena that rl_arguments_parse was given, strings in argv or there. */
 typedef struct rl_arguments {
     const char *operand;    /* or NULL */
+    const char *second;     /* of two, or NULL */
     rl_options run;         /* handed to rl_session_open as it is, after .pipeline and .log are set */
     const char *trace;      /* or NULL */
     int size[2];            /* bench: width, height; 0 = the capture's */
     int on_missing, format; /* words, as indices of rl_on_missing and rl_plan_word */
+    const char *metric, *heatmap;
+    const char *const *fail_over; /* "flip.p95=0.05", "0.02" */
+    size_t n_fail_over;
     bool json, markdown, quiet, verbose, help;
 } rl_arguments;
 

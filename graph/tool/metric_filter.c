@@ -1,0 +1,87 @@
+#include "graph/tool/metric_filter.h"
+
+#include <math.h>
+
+rl_filter rl_filter_gaussian(double sigma, int radius)
+{
+    rl_filter f = {.radius = radius};
+    double sum = 0;
+    for (int i = -radius; i <= radius; i++)
+        sum += f.w[i + radius] = exp(-i * i / (2 * sigma * sigma));
+    for (int i = 0; i <= 2 * radius; i++)
+        f.w[i] /= sum;
+    return f;
+}
+
+int rl_filter_width(int width)
+{
+    return (width + RL_FILTER_BLOCK - 1) / RL_FILTER_BLOCK * RL_FILTER_BLOCK;
+}
+
+/* A block's sums stay in registers while the taps pass. */
+static inline void __attribute__((always_inline))
+sum_blocks(double *out, const double *const *rows, const double *w, int taps, int n)
+{
+    for (int x = 0; x < n; x += RL_FILTER_BLOCK) {
+        double sum[RL_FILTER_BLOCK] = {0};
+        for (int k = 0; k < taps; k++)
+            for (int i = 0; i < RL_FILTER_BLOCK; i++)
+                sum[i] += w[k] * rows[k][x + i];
+        for (int i = 0; i < RL_FILTER_BLOCK; i++)
+            out[x + i] = sum[i];
+    }
+}
+
+#if defined(__x86_64__) && defined(__GNUC__)
+/* Wider vectors, same order, no fused operations: same bits. */
+static void __attribute__((target("avx2")))
+sum_avx2(double *out, const double *const *rows, const double *w, int taps, int n)
+{
+    sum_blocks(out, rows, w, taps, n);
+}
+
+void rl_filter_sum(double *out, const double *const *rows, const double *w, int taps, int n)
+{
+    if (__builtin_cpu_supports("avx2"))
+        sum_avx2(out, rows, w, taps, n);
+    else
+        sum_blocks(out, rows, w, taps, n);
+}
+#else
+void rl_filter_sum(double *out, const double *const *rows, const double *w, int taps, int n)
+{
+    sum_blocks(out, rows, w, taps, n);
+}
+#endif
+
+void rl_filter_along(double *out, const double *padded, const rl_filter *f, int n)
+{
+    const double *rows[2 * RL_FILTER_RADIUS + 1];
+    int taps = 2 * f->radius + 1;
+    for (int k = 0; k < taps; k++)
+        rows[k] = padded + RL_FILTER_RADIUS - f->radius + k;
+    rl_filter_sum(out, rows, f->w, taps, n);
+}
+
+void rl_filter_pad(double *padded, const float *row, int width)
+{
+    int n = rl_filter_width(width) + 2 * RL_FILTER_RADIUS;
+    for (int i = 0; i < n; i++) {
+        int x = i - RL_FILTER_RADIUS;
+        padded[i] = (double)row[x < 0 ? 0 : x < width ? x : width - 1];
+    }
+}
+
+int rl_band_count(int height)
+{
+    return (height + RL_BAND_ROWS - 1) / RL_BAND_ROWS;
+}
+
+void rl_filter_bands(rl_pool *pool, int n, void (*body)(void *ctx, int i), void *ctx)
+{
+    if (pool)
+        rl_pool_for(pool, n, body, ctx);
+    else
+        for (int i = 0; i < n; i++)
+            body(ctx, i);
+}
