@@ -108,12 +108,13 @@ static void on_frame(void *ctx, const rl_frame_result *f)
     s->failed += f->error->code != RL_OK;
 }
 
-static double mean(const size_t *values, size_t from, size_t to)
+/* The least, not the mean: what the frames in flight happen to hold besides comes and goes with the threads; a leak stays. */
+static double least(const size_t *values, size_t from, size_t to)
 {
-    double sum = 0;
+    size_t m = values[from];
     for (size_t i = from; i < to; i++)
-        sum += (double)values[i];
-    return sum / (double)(to - from);
+        m = values[i] < m ? values[i] : m;
+    return (double)m;
 }
 
 static int most(const int *values, size_t from, size_t to)
@@ -148,7 +149,7 @@ static void test_soak(void **state)
     rl_session_close(&session);
     assert_int_equal(s.frames, n);
     assert_int_equal(s.failed, 0);
-    double second = mean(s.live, n / 4, n / 2), last = mean(s.live, n - n / 4, n);
+    double second = least(s.live, n / 4, n / 2), last = least(s.live, n - n / 4, n);
     print_message("%zu frames: %.2f MiB in the second quarter, %.2f MiB in the last\n", n, second / 1048576,
                   last / 1048576);
     assert_true(last <= 1.01 * second);

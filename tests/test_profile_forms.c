@@ -11,7 +11,8 @@
 
 static const rl_stencil_name names[] = {{1, "skin"}};
 
-static rl_code resolve_with(const rl_registry *registry, const rl_pass *used, const char *profile, const rl_materials **out)
+static rl_code resolve_with(const rl_registry *registry, const rl_pass *used, const char *profile,
+                            const rl_materials **out)
 {
     char text[512];
     snprintf(text, sizeof text, "profiles:\n  a: {%s}\nmaterials: {skin: {profile: a}}", profile);
@@ -48,7 +49,8 @@ static void refuse(const char *profile, const char *expected)
     config_assert_error(expected);
 }
 
-/* ---- formulas --------------------------------------------------------------------------------------------- */
+/* ---- formulas ---------------------------------------------------------------------------------------------
+ */
 
 /* A = 0.8, 0.5, 0.33 make every formula short enough for pencil and paper. */
 static void test_by_hand(void **state)
@@ -60,7 +62,8 @@ static void test_by_hand(void **state)
     distance("param: mean_free_path_diffuse, mean_free_path_mm: [1, 2, 3], albedo: [0.8, 0.5, 0.33]", d);
     assert_near(d, 1 / 1.1, 2 / 1.715, 3 / 2.34315);
     distance("param: cycles_radius, cycles_radius_mm: [1, 2, 3], albedo: [0.8, 0.5, 0.33]", d);
-    assert_near(d, 0.07957747154594767 / 1.1, 2 * 0.07957747154594767 / 1.715, 3 * 0.07957747154594767 / 2.34315);
+    assert_near(d, 0.07957747154594767 / 1.1, 2 * 0.07957747154594767 / 1.715,
+                3 * 0.07957747154594767 / 2.34315);
     distance("param: unreal_dmfp, diffuse_mean_free_path_mm: [1, 2, 3], albedo: [0.8, 0.5, 0.33]", d);
     assert_near(d, 1 / 8.379681, 2 / 3.583521, 3 / 3.5);
     distance("param: mean_free_path, mean_free_path_mm: 2, albedo: 1", d); /* one number for all channels */
@@ -87,8 +90,8 @@ static void test_round_trip(void **state)
         for (size_t i = 0; i < sizeof ways / sizeof *ways; i++) {
             double l = ways[i].factor * rl_burley_scale(ways[i].fit, albedo), d[3];
             char profile[256];
-            snprintf(profile, sizeof profile, "param: %s, %s: [%.17g, %.17g, %.17g], albedo: %.17g", ways[i].word,
-                     ways[i].key, 3 * l, 1.2 * l, 0.7 * l, albedo);
+            snprintf(profile, sizeof profile, "param: %s, %s: [%.17g, %.17g, %.17g], albedo: %.17g",
+                     ways[i].word, ways[i].key, 3 * l, 1.2 * l, 0.7 * l, albedo);
             distance(profile, d);
             assert_near(d, 3, 1.2, 0.7);
         }
@@ -100,16 +103,19 @@ static void test_brighter_is_wider(void **state)
 {
     (void)state;
     for (double a = 0; a < 0.79; a += 0.01) {
-        assert_true(rl_burley_scale(RL_BURLEY_SEARCHLIGHT, a) > rl_burley_scale(RL_BURLEY_SEARCHLIGHT, a + 0.01));
+        assert_true(rl_burley_scale(RL_BURLEY_SEARCHLIGHT, a) >
+                    rl_burley_scale(RL_BURLEY_SEARCHLIGHT, a + 0.01));
         assert_true(rl_burley_scale(RL_BURLEY_DIFFUSE, a) > rl_burley_scale(RL_BURLEY_DIFFUSE, a + 0.01));
     }
     /* In units of l_d the profile is widest at 0.33 */
     assert_true(rl_burley_scale(RL_BURLEY_DMFP, 0.33) == 3.5);
 }
 
-/* ---- the default ------------------------------------------------------------------------------------------ */
+/* ---- the default ------------------------------------------------------------------------------------------
+ */
 
-/* Profiles that do not say `param`: each number as it is written, to the bit, and the same table with the word. */
+/* Profiles that do not say `param`: each number as it is written, to the bit, and the same table with the
+ * word. */
 static void test_default(void **state)
 {
     (void)state;
@@ -124,31 +130,35 @@ static void test_default(void **state)
     assert_true(d[0] == (double)3.0f && d[1] == (double)1.2f && d[2] == (double)0.7f);
 }
 
-/* ---- mistakes --------------------------------------------------------------------------------------------- */
+/* ---- mistakes ---------------------------------------------------------------------------------------------
+ */
 
 static void test_mistakes(void **state)
 {
     (void)state;
     refuse("param: mean_free_path, mean_free_path_mm: 1",
-           "t.yaml:2:14: error: profile 'a': 'param: mean_free_path' needs 'albedo' (reflectance A of the surface that "
+           "t.yaml:2:14: error: profile 'a': 'param: mean_free_path' needs 'albedo' (reflectance A of the "
+           "surface that "
            "the other renderer was told; only for the formulas of param)");
-    refuse("param: cycles_radius, albedo: 0.5",
-           "t.yaml:2:14: error: profile 'a': 'param: cycles_radius' needs 'cycles_radius_mm' (radius times scale "
-           "of a Cycles material, a channel)");
+    refuse("param: cycles_radius, albedo: 0.5", "t.yaml:2:14: error: profile 'a': 'param: cycles_radius' "
+                                                "needs 'cycles_radius_mm' (radius times scale "
+                                                "of a Cycles material, a channel)");
     refuse("param: mean_free_path, mean_free_path_mm: 1, albedo: 0.5, scatter_distance_mm: 1",
-           "t.yaml:2:86: error: profile 'a': 'param: mean_free_path' has no use for 'scatter_distance_mm', which goes "
+           "t.yaml:2:86: error: profile 'a': 'param: mean_free_path' has no use for 'scatter_distance_mm', "
+           "which goes "
            "with 'param: scatter_distance' (or null removes it)");
-    refuse("mean_free_path_mm: 1, albedo: 0.5",
-           "t.yaml:2:26: error: profile 'a': 'param: scatter_distance' has no use for 'mean_free_path_mm', which goes "
-           "with 'param: mean_free_path' (or null removes it)");
+    refuse("mean_free_path_mm: 1, albedo: 0.5", "t.yaml:2:26: error: profile 'a': 'param: scatter_distance' "
+                                                "has no use for 'mean_free_path_mm', which goes "
+                                                "with 'param: mean_free_path' (or null removes it)");
     refuse("param: unreal_dmfp, diffuse_mean_free_path_mm: 1e-4, albedo: 0.5",
            "t.yaml:2:54: error: profile 'a': 'scatter_distance_mm' that follows from 'param: unreal_dmfp' is "
            "2.79055e-05 mm; expected 0.0001 … 10000");
-    refuse("param: scatter_distance",
-           "t.yaml:2:3: error: profile 'a' needs 'scatter_distance_mm' for pass sss_burley: scattering distance d = 1/s "
-           "a channel, for Burley's profile");
+    refuse("param: scatter_distance", "t.yaml:2:3: error: profile 'a' needs 'scatter_distance_mm' for pass "
+                                      "sss_burley: scattering distance d = 1/s "
+                                      "a channel, for Burley's profile");
     refuse("param: mean_free_path, mean_free_path_mm: 1, albedo: 1.5",
-           "t.yaml:2:60: error: 'albedo': expected a number or a list of three, each 0 … 1 (ratio), found the number '1.5'");
+           "t.yaml:2:60: error: 'albedo': expected a number or a list of three, each 0 … 1 (ratio), found "
+           "the number '1.5'");
 }
 
 /* A profile that no material uses is checked as well, and does not inherit from the one before it. */
@@ -160,15 +170,18 @@ static void test_unused_profiles(void **state)
     const rl_value *root = config_parse("a: {param: mean_free_path, mean_free_path_mm: 1, albedo: 0.5}\n"
                                         "b: {scatter_distance_mm: 1}\n"
                                         "c: {gaussians: [{variance_mm2: 1, weight: 1}]}\n");
-    assert_int_equal(rl_materials_resolve(&config_arena, root, NULL, NULL, names, 1, &used, 1, &config_log, &m,
-                                          &config_error), RL_OK);
+    assert_int_equal(rl_materials_resolve(&config_arena, root, NULL, NULL, names, 1, &used, 1, &config_log,
+                                          &m, &config_error),
+                     RL_OK);
     root = config_parse("a: {scatter_distance_mm: 1}\nb: {param: cycles_radius, cycles_radius_mm: 1}\n");
-    assert_int_equal(rl_materials_resolve(&config_arena, root, NULL, NULL, names, 1, &used, 1, &config_log, &m,
-                                          &config_error), RL_E_CONFIG);
+    assert_int_equal(rl_materials_resolve(&config_arena, root, NULL, NULL, names, 1, &used, 1, &config_log,
+                                          &m, &config_error),
+                     RL_E_CONFIG);
     config_error = (rl_error){0};
 }
 
-/* ---- any pass --------------------------------------------------------------------------------------------- */
+/* ---- any pass ---------------------------------------------------------------------------------------------
+ */
 
 static double from_area(const double from[2])
 {

@@ -10,7 +10,8 @@
 
 static const double same[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
 
-/* ---- chromaticity ----------------------------------------------------------------------------------------- */
+/* ---- chromaticity -----------------------------------------------------------------------------------------
+ */
 
 /* Wyman, Sloan and Shirley 2013, multi-lobe fits to the CIE 1931 functions. */
 static double lobe(double nm, double mean, double below, double above)
@@ -51,12 +52,14 @@ static double apart(const double a[2], const double b[2])
     return hypot(a[0] - b[0], a[1] - b[1]);
 }
 
-/* CIE standard illuminant A is a black body of 2856 K (CIE 015); the others are the locus in Wyszecki and Stiles 1982. */
+/* CIE standard illuminant A is a black body of 2856 K (CIE 015); the others are the locus in Wyszecki and
+ * Stiles 1982. */
 static void test_published(void **state)
 {
     (void)state;
-    static const double published[][3] = {{1000, 0.6528, 0.3444},    {2000, 0.5267, 0.4133},    {10000, 0.2807, 0.2884},
-                                          {2856, 0.44757, 0.40745}, {3000, 0.43693, 0.40407}, {4000, 0.38052, 0.37676},
+    static const double published[][3] = {{1000, 0.6528, 0.3444},   {2000, 0.5267, 0.4133},
+                                          {10000, 0.2807, 0.2884},  {2856, 0.44757, 0.40745},
+                                          {3000, 0.43693, 0.40407}, {4000, 0.38052, 0.37676},
                                           {5000, 0.34510, 0.35161}, {6000, 0.32208, 0.33178}};
     for (size_t i = 0; i < sizeof published / sizeof *published; i++) {
         double xy[2];
@@ -67,8 +70,8 @@ static void test_published(void **state)
     }
 }
 
-/* Two independent fits, whose own errors bound the comparison: Kim's locus, and Wyman's functions integrated. Their red
- * tails end too soon, which is 0.015 at 1000 K, where most of the light is there. */
+/* Two independent fits, whose own errors bound the comparison: Kim's locus, and Wyman's functions integrated.
+ * Their red tails end too soon, which is 0.015 at 1000 K, where most of the light is there. */
 static void test_fits(void **state)
 {
     (void)state;
@@ -121,7 +124,8 @@ static void test_tint(void **state)
     assert_true(apart(xy, d65) < 3e-4);
 }
 
-/* ---- RGB -------------------------------------------------------------------------------------------------- */
+/* ---- RGB --------------------------------------------------------------------------------------------------
+ */
 
 static double luminance(const double c[3])
 {
@@ -150,7 +154,8 @@ static void test_rgb(void **state)
 static void test_other_space(void **state)
 {
     (void)state;
-    static const double wide[9] = {1.66, -0.59, -0.07, -0.12, 1.13, -0.01, -0.02, -0.10, 1.12}; /* Rec.2020, 2 digits */
+    static const double wide[9] = {1.66,  -0.59, -0.07, -0.12, 1.13,
+                                   -0.01, -0.02, -0.10, 1.12}; /* Rec.2020, 2 digits */
     for (double t = 2200; t < 20000; t *= 1.5) {
         double a[3], b[3], back[3] = {0};
         rl_kelvin_rgb(t, 0, same, a);
@@ -178,7 +183,8 @@ static void test_inverse(void **state)
     assert_false(rl_invert3(flat, inverse));
 }
 
-/* ---- lights ----------------------------------------------------------------------------------------------- */
+/* ---- lights -----------------------------------------------------------------------------------------------
+ */
 
 static rl_code parse(const char *keys, rl_lights *out)
 {
@@ -207,7 +213,8 @@ static void test_keys(void **state)
     assert_true(lights.light[0].kelvin == 0);
     refuse("color: 1, temperature: 5600",
            "t.yaml:1:76: error: light 'k' has both color and temperature; give one");
-    refuse("tint: 0.01", "t.yaml:1:59: error: light 'k': 'tint' is off the locus of a 'temperature'; give one");
+    refuse("tint: 0.01",
+           "t.yaml:1:59: error: light 'k': 'tint' is off the locus of a 'temperature'; give one");
     refuse("temperature: 999", "t.yaml:1:66: error: 'temperature' is 999: out of range, 1000 to 40000");
     refuse("temperature: 40001", "t.yaml:1:66: error: 'temperature' is 40001: out of range, 1000 to 40000");
     refuse("temperature: 5000, tint: 0.1", "t.yaml:1:78: error: 'tint' is 0.1: out of range, -0.05 to 0.05");
@@ -218,7 +225,8 @@ static void test_keys(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        T(test_published), T(test_fits), T(test_tint), T(test_rgb), T(test_other_space), T(test_inverse), T(test_keys),
+        T(test_published),   T(test_fits),    T(test_tint), T(test_rgb),
+        T(test_other_space), T(test_inverse), T(test_keys),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

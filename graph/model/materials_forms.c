@@ -32,8 +32,8 @@ static const rl_form *chosen(const rl_materials *m, const rl_param *row, const c
 }
 
 /* Numbers that another choice would read: they would be without effect, which nobody means. */
-static rl_code check_others(const rl_param *row, const rl_form *form, const rl_value *profile, const char *name,
-                            rl_error *err)
+static rl_code check_others(const rl_param *row, const rl_form *form, const rl_value *profile,
+                            const char *name, rl_error *err)
 {
     for (size_t i = 0; i < row->forms.n; i++) {
         const rl_form *other = &row->forms.rows[i];
@@ -41,22 +41,23 @@ static rl_code check_others(const rl_param *row, const rl_form *form, const rl_v
             const rl_value *given = rl_value_get(profile, other->from[k]);
             if (given && !uses(form, other->from[k]))
                 return rl_fail(err, RL_E_CONFIG, given->where,
-                               "profile '%s': '%s: %s' has no use for '%s', which goes with '%s: %s' (or null removes it)",
+                               "profile '%s': '%s: %s' has no use for '%s', which goes with '%s: %s' (or "
+                               "null removes it)",
                                name, row->form_row, form->word, other->from[k], row->form_row, other->word);
         }
     }
     return RL_OK;
 }
 
-static rl_code check_given(const rl_materials *m, const rl_param *row, const rl_form *form, const rl_value *profile,
-                           const char *name, rl_error *err)
+static rl_code check_given(const rl_materials *m, const rl_param *row, const rl_form *form,
+                           const rl_value *profile, const char *name, rl_error *err)
 {
     const rl_value *word = rl_value_get(profile, row->form_row);
     for (int k = 0; k < MOST_FROM && form->from[k]; k++)
         if (!rl_value_get(profile, form->from[k]))
             return rl_fail(err, RL_E_CONFIG, word ? word->where : profile->where,
-                           "profile '%s': '%s: %s' needs '%s' (%s)", name, row->form_row, form->word, form->from[k],
-                           find_row(m, form->from[k])->param->help);
+                           "profile '%s': '%s: %s' needs '%s' (%s)", name, row->form_row, form->word,
+                           form->from[k], find_row(m, form->from[k])->param->help);
     return RL_OK;
 }
 
@@ -67,8 +68,8 @@ static float channel(const rl_material_row *row, const char *entry, size_t c)
     return v;
 }
 
-static rl_code derive(const rl_materials *m, const rl_material_row *row, const rl_form *form, const rl_value *profile,
-                      const char *name, char *entry, rl_error *err)
+static rl_code derive(const rl_materials *m, const rl_material_row *row, const rl_form *form,
+                      const rl_value *profile, const char *name, char *entry, rl_error *err)
 {
     for (size_t c = 0; c < (row->param->type == RL_RGBF ? 3 : 1); c++) {
         double from[MOST_FROM] = {0};
@@ -86,7 +87,8 @@ static rl_code derive(const rl_materials *m, const rl_material_row *row, const r
     return RL_OK;
 }
 
-rl_code rl_forms_apply(const rl_materials *m, const rl_value *profile, const char *name, char *entry, rl_error *err)
+rl_code rl_forms_apply(const rl_materials *m, const rl_value *profile, const char *name, char *entry,
+                       rl_error *err)
 {
     rl_code code = RL_OK;
     for (size_t i = 0; i < m->n_rows && !code; i++) {

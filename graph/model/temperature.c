@@ -29,8 +29,8 @@ static const double matching[][3] = {
 };
 
 /* To linear Rec.709, whose white is D65 (IEC 61966-2-1). */
-static const double from_xyz[9] = {3.2404542,  -1.5371385, -0.4985314, -0.9692660, 1.8760108,
-                                   0.0415560,  0.0556434,  -0.2040259, 1.0572252};
+static const double from_xyz[9] = {3.2404542, -1.5371385, -0.4985314, -0.9692660, 1.8760108,
+                                   0.0415560, 0.0556434,  -0.2040259, 1.0572252};
 static const double luminance[3] = {0.2126729, 0.7151522, 0.0721750};
 
 void rl_kelvin_xy(double kelvin, double xy[2])
