@@ -69,6 +69,20 @@ static void add_ports(const rl_pass *pass, rl_str *out)
     }
 }
 
+/* In which other terms the value of a row may be given. */
+static void add_forms(const rl_param *row, rl_str *out)
+{
+    for (size_t i = 0; i < row->forms.n; i++) {
+        const rl_form *form = &row->forms.rows[i];
+        rl_str_printf(out, "| … `%s: %s` | ", row->form_row, form->word);
+        add_cell(out, form->formula);
+        rl_str_printf(out, " | needs `%s`%s%s%s | ", form->from[0], form->from[1] ? ", `" : "",
+                      form->from[1] ? form->from[1] : "", form->from[1] ? "`" : "");
+        add_cell(out, form->source);
+        rl_str_add(out, " |\n");
+    }
+}
+
 /* `list`: the row of the list that these are the keys of, or NULL. */
 static void add_rows(rl_params rows, const rl_param *list, rl_str *out)
 {
@@ -85,6 +99,7 @@ static void add_rows(rl_params rows, const rl_param *list, rl_str *out)
         rl_str_add(out, " |\n");
         out->failed = out->failed || values.failed;
         rl_str_free(&values);
+        add_forms(row, out);
         add_rows(row->list, row, out);
     }
 }
