@@ -145,8 +145,10 @@ static json_t *default_json(const rl_param *row)
     rl_str text = {0};
     union {
         float f[3];
-        int32_t i;
-    } value = {{0}};
+        int32_t i, set[RL_SET_WORDS];
+    } value = {.set = {0}};
+    _Static_assert(sizeof value >= RL_PARAM_BYTES(RL_RGBF) && sizeof value >= RL_PARAM_BYTES(RL_MATERIALS),
+                   "room for the largest value of a row");
     if (row->type == RL_ROWS) /* none of its own */
         return json_string("[]");
     rl_param_default(row, &value);
