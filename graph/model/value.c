@@ -62,7 +62,8 @@ const rl_value *rl_value_at(const rl_value *root, const char *path)
 
 char *rl_value_path(rl_arena *arena, const rl_value *v)
 {
-    if (!v->where.file || v->where.line == 0)
+    bool option = v->where.file && !strncmp(v->where.file, "--", 2); /* "--set PATH=VALUE" */
+    if (!v->where.file || v->where.line == 0 || option)
         return rl_arena_strdup(arena, v->text);
     char *folder = rl_path_folder(arena, v->where.file);
     return folder ? rl_path_join(arena, folder, v->text) : NULL;
