@@ -31,8 +31,8 @@ typedef struct rl_session rl_session;
 /* ---- opening ---------------------------------------------------------------------------------------------
  */
 
-/* A frame whose files are missing or broken: an error of that frame; or no output for it; or the layers and the
- * camera of the frame before it in the run under its number. Whichever, history ends there. */
+/* A frame whose files are missing or broken: an error of that frame; or no output for it; or the layers and
+ * the camera of the frame before it in the run under its number. Whichever, history ends there. */
 typedef enum rl_on_missing { RL_MISSING_ERROR, RL_MISSING_SKIP, RL_MISSING_HOLD } rl_on_missing;
 
 /* A value of the pipeline by its dotted path: {"graph.sss.taps", "55"}. `value` is one YAML value; "null"
@@ -62,11 +62,11 @@ typedef struct rl_options {
     const char *device;    /* "cpu", "gpu", a number; NULL = a CPU device if there is one */
     uint64_t memory_limit; /* bytes; 0 = none */
     rl_on_missing on_missing;
-    bool resume;           /* frames whose pictures are there, made of the same inputs by the same pipeline, stay */
-    int shard[2];          /* {I, N}: the I-th of N parts, from 1; N = 0: everything */
-    int preroll;           /* frames of warm-up before a shard's first; 0 = history comes from the shard before it */
+    bool resume;  /* frames whose pictures are there, made of the same inputs by the same pipeline, stay */
+    int shard[2]; /* {I, N}: the I-th of N parts, from 1; N = 0: everything */
+    int preroll;  /* frames of warm-up before a shard's first; 0 = history comes from the shard before it */
     int checkpoint_frames; /* a checkpoint of history every so many frames; 0 = by what one costs */
-    const char *ocio; /* OpenColorIO config; NULL = the pipeline's, else $OCIO, else relit's own */
+    const char *ocio;      /* OpenColorIO config; NULL = the pipeline's, else $OCIO, else relit's own */
     const rl_log *log;
 } rl_options;
 
@@ -95,18 +95,19 @@ void rl_text_free(char *text);
 
 /* What a run with options.shard does to a capture. */
 typedef struct rl_shard_part {
-    size_t n;                    /* frames that it writes; 0: none, and nothing below counts */
-    long long first, last;       /* the first and the last of them */
-    bool history;                /* the graph keeps history */
-    size_t preroll;              /* frames of warm-up before them, fewer than asked for behind a cut: then exact */
-    bool exact;                  /* the pictures are those of one run over all frames, bit for bit */
+    size_t n;              /* frames that it writes; 0: none, and nothing below counts */
+    long long first, last; /* the first and the last of them */
+    bool history;          /* the graph keeps history */
+    size_t preroll;        /* frames of warm-up before them, fewer than asked for behind a cut: then exact */
+    bool exact;            /* the pictures are those of one run over all frames, bit for bit */
     bool takes_over, hands_over; /* history, from the checkpoint after frame `from`; after its last frame */
     long long from;
 } rl_shard_part;
 void rl_session_shard(const rl_session *session, size_t capture, rl_shard_part *out);
 
-/* A node that keeps history: the least share that a frame has in its result, < 0 when the pass does not say. What lies
- * before K frames of warm-up then has at most the share (1 - least)^(K+1) in the first picture behind them. */
+/* A node that keeps history: the least share that a frame has in its result, < 0 when the pass does not say.
+ * What lies before K frames of warm-up then has at most the share (1 - least)^(K+1) in the first picture
+ * behind them. */
 typedef struct rl_fading {
     const char *node, *pass;
     double least;
@@ -126,12 +127,13 @@ typedef struct rl_frame_result {
     size_t n_files;        /* written */
     const char *const *files;
     uint64_t nonfinite, clamped;   /* samples of the capture that were NaN or infinite (now 0), or clamped */
-    uint64_t clipped; /* samples of the outputs beyond what their files can hold */
+    uint64_t clipped;              /* samples of the outputs beyond what their files can hold */
     double load_s, run_s, write_s; /* seconds in each stage */
     size_t done, total;            /* frames of the whole run, this one included */
 } rl_frame_result;
 
-/* What took which time: a stage of a frame (category "read", "run", "write", "checkpoint"), an output that was written
+/* What took which time: a stage of a frame (category "read", "run", "write", "checkpoint"), an output that
+ * was written
  * ("encode"), or a step on the device ("kernel", "colour", "convert", "copy"). */
 typedef enum rl_lane { RL_LANE_READ, RL_LANE_RUN, RL_LANE_DEVICE, RL_LANE_WRITE, RL_LANES } rl_lane;
 
@@ -190,21 +192,22 @@ typedef struct rl_frame_data {
     double jitter[2];           /* pixels; used when the manifest says `jitter: header` */
 } rl_frame_data;
 
-/* Runs the graph on one frame; frames of a sequence must come in order: history ends at a gap of the numbers, at a `cuts:`
- * of the manifest, at a jump of the camera, when the size changes, and after a frame that failed. Nothing is written: read
- * the images. With data NULL the frame is read from the session's capture. */
+/* Runs the graph on one frame; frames of a sequence must come in order: history ends at a gap of the numbers,
+ * at a `cuts:` of the manifest, at a jump of the camera, when the size changes, and after a frame that
+ * failed. Nothing is written: read the images. With data NULL the frame is read from the session's capture.
+ */
 rl_code rl_session_process(rl_session *session, size_t capture, long long frame, const rl_frame_data *data,
                            rl_error *err);
 /* Forgets history. */
 void rl_session_cut(rl_session *session);
 
 /* An image that the session's outputs (or `dump`) ask for, of the last processed frame: "light.diffuse".
- * Planes R, G, B and such; ids, as the capture has them, are given as floats' bits (format "id"). Valid until the next call that
- * processes or closes. */
+ * Planes R, G, B and such; ids, as the capture has them, are given as floats' bits (format "id"). Valid until
+ * the next call that processes or closes. */
 typedef struct rl_image_view {
     int x, y, width, height; /* data window */
     int planes;
-    const char *format; /* "rgb", "normal", "vec2", "scalar", "id", "lights" */
+    const char *format;     /* "rgb", "normal", "vec2", "scalar", "id", "lights" */
     const float *plane[16]; /* the first 16; "lights" may have more */
     size_t stride;          /* floats from row to row */
     size_t plane_stride;    /* from plane to plane: plane i is at plane[0] + i * plane_stride */

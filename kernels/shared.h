@@ -66,9 +66,10 @@ typedef struct lobe_t { /* a spherical Gaussian */
 } lobe_t;
 
 typedef struct ambient_t {
-    int on;       /* 0: no light, nothing else is looked at */
+    int on; /* 0: no light, nothing else is looked at */
     int lobes;
-    float sh[27]; /* coefficient i of channel c at 3 i + c; real orthonormal harmonics, 1 y z x xy yz zz xz xx-yy */
+    float sh[27]; /* coefficient i of channel c at 3 i + c; real orthonormal harmonics, 1 y z x xy yz zz xz
+                     xx-yy */
     lobe_t lobe[RL_LOBES];
 } ambient_t;
 

@@ -72,9 +72,9 @@ static double from_cycles_radius(const double from[2])
     return from[0] / (4 * pi * rl_burley_scale(RL_BURLEY_DIFFUSE, from[1]));
 }
 
-/* Unreal's d, in its own words: l_d is Mean Free Path Color times Distance times World Unit Scale. Profiles that it has
- * moved to Enable Mean Free Path tell l instead, with l_d = l s_8/(0.6 s_5): that is mean_free_path with l/0.6. In those
- * that it has not, World Unit Scale counts 10/3. */
+/* Unreal's d, in its own words: l_d is Mean Free Path Color times Distance times World Unit Scale. Profiles
+ * that it has moved to Enable Mean Free Path tell l instead, with l_d = l s_8/(0.6 s_5): that is
+ * mean_free_path with l/0.6. In those that it has not, World Unit Scale counts 10/3. */
 static double from_unreal_dmfp(const double from[2])
 {
     return from[0] / rl_burley_scale(RL_BURLEY_DMFP, from[1]);
@@ -83,15 +83,27 @@ static double from_unreal_dmfp(const double from[2])
 #define PAPER "Christensen and Burley 2015, "
 const rl_form rl_scatter_forms[RL_SCATTER_FORMS] = {
     {"scatter_distance", {"scatter_distance_mm"}, NULL, "d as given", PAPER "eq. 3 with A = 1"},
-    {"mean_free_path", {"mean_free_path_mm", "albedo"}, from_mean_free_path,
-     "d = l/s, s = 1.85 - A + 7 |A - 0.8|^3", PAPER "eq. 5: light that comes in along the normal"},
-    {"mean_free_path_diffuse", {"mean_free_path_mm", "albedo"}, from_mean_free_path_diffuse,
-     "d = l/s, s = 1.9 - A + 3.5 (A - 0.8)^2", PAPER "eq. 6: light that a diffuse surface lets in"},
-    {"cycles_radius", {"cycles_radius_mm", "albedo"}, from_cycles_radius,
+    {"mean_free_path",
+     {"mean_free_path_mm", "albedo"},
+     from_mean_free_path,
+     "d = l/s, s = 1.85 - A + 7 |A - 0.8|^3",
+     PAPER "eq. 5: light that comes in along the normal"},
+    {"mean_free_path_diffuse",
+     {"mean_free_path_mm", "albedo"},
+     from_mean_free_path_diffuse,
+     "d = l/s, s = 1.9 - A + 3.5 (A - 0.8)^2",
+     PAPER "eq. 6: light that a diffuse surface lets in"},
+    {"cycles_radius",
+     {"cycles_radius_mm", "albedo"},
+     from_cycles_radius,
      "d = radius/(4 pi s), s = 1.9 - A + 3.5 (A - 0.8)^2",
      "Cycles, kernel/closure/bssrdf.h; " PAPER "eq. 6"},
-    {"unreal_dmfp", {"diffuse_mean_free_path_mm", "albedo"}, from_unreal_dmfp,
-     "d = l_d/s, s = 3.5 + 100 (A - 0.33)^4", "Unreal, BurleyNormalizedSSSCommon.ush (with its Enable Mean Free Path: mean_free_path, of l/0.6); " PAPER "eq. 8"},
+    {"unreal_dmfp",
+     {"diffuse_mean_free_path_mm", "albedo"},
+     from_unreal_dmfp,
+     "d = l_d/s, s = 3.5 + 100 (A - 0.33)^4",
+     "Unreal, BurleyNormalizedSSSCommon.ush (with its Enable Mean Free Path: mean_free_path, of "
+     "l/0.6); " PAPER "eq. 8"},
 };
 
 const rl_param rl_scatter_profile_rows[RL_SCATTER_PROFILE_ROWS] = {

@@ -36,8 +36,8 @@ double rl_burley_inverse(double xi);
  * all taps. With ½ each tap is in the middle of its share; other offsets fill the gaps between those. */
 void rl_burley_taps(size_t n, double offset, float *x, float *y, float *weight);
 
-/* s(A), A in 0 … 1 the reflectance of the surface, in d = l/s: fits to Monte Carlo renderings of a flat half space with
- * index-matched, isotropic scattering. */
+/* s(A), A in 0 … 1 the reflectance of the surface, in d = l/s: fits to Monte Carlo renderings of a flat half
+ * space with index-matched, isotropic scattering. */
 typedef enum rl_burley_fit {
     RL_BURLEY_SEARCHLIGHT, /* eq. 5: l the mean free path, a beam along the normal; 5.5 % off on average */
     RL_BURLEY_DIFFUSE,     /* eq. 6: l the mean free path, light that a rough surface lets in; 3.9 % */
@@ -49,7 +49,8 @@ double rl_burley_scale(rl_burley_fit fit, double albedo);
 #define RL_SCATTER_PROFILE_ROWS 8
 #define RL_SCATTER_SHADING_ROWS 2
 extern const rl_param
-    rl_scatter_profile_rows[RL_SCATTER_PROFILE_ROWS]; /* scatter_distance_mm texturing border, and what the first may be derived from */
+    rl_scatter_profile_rows[RL_SCATTER_PROFILE_ROWS]; /* scatter_distance_mm texturing border, and what the
+                                                         first may be derived from */
 extern const rl_param rl_scatter_shading_rows[RL_SCATTER_SHADING_ROWS]; /* diffuse exit_transmission */
 
 #ifdef __cplusplus

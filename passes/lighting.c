@@ -1,11 +1,10 @@
-/* Light on the G-buffer: point, spot and directional lights, unshadowed ambient light, Lambert's or Disney's diffuse
- * transmission, GGX specular, translucency through a slab.
+/* Light on the G-buffer: point, spot and directional lights, unshadowed ambient light, Lambert's or Disney's
+ * diffuse transmission, GGX specular, translucency through a slab.
  *
  * Golubev 2018 (transmission at entry and exit, texturing modes, thin and thick slabs), Helix (Beer-Lambert),
- * MJP (scattering as spherical Gaussians: the irradiance is complete, and goes into `lit`), Ramamoorthi and Hanrahan 2001
- * (irradiance of spherical harmonics),
- * McGuire and Mara 2014 (shadows marched in the depth buffer),
- * Walter 2007 and Heitz 2014 (GGX, height-correlated Smith), Schlick 1994 (Fresnel). */
+ * MJP (scattering as spherical Gaussians: the irradiance is complete, and goes into `lit`), Ramamoorthi and
+ * Hanrahan 2001 (irradiance of spherical harmonics), McGuire and Mara 2014 (shadows marched in the depth
+ * buffer), Walter 2007 and Heitz 2014 (GGX, height-correlated Smith), Schlick 1994 (Fresnel). */
 #include "passes/shading_rows.h"
 
 typedef struct lighting_params {
@@ -75,16 +74,19 @@ static const rl_port ports[] = {
     {"stencil", RL_READ, RL_ID, .help = "material"},
     {"thickness", RL_READ, RL_SCALAR, .help = "metres along the inward normal, 0 = unknown",
      .optional = true},
-    {"shadow", RL_READ, RL_LIGHTS, .help = "visibility of each light, 0 to 1; shadow: screen needs none, and leaves back faces lit", .optional = true},
-    {"shadow_thickness", RL_READ, RL_LIGHTS, .help = "metres along the light's ray, 0 where lit; unknown with shadow: screen",
+    {"shadow", RL_READ, RL_LIGHTS,
+     .help = "visibility of each light, 0 to 1; shadow: screen needs none, and leaves back faces lit",
      .optional = true},
+    {"shadow_thickness", RL_READ, RL_LIGHTS,
+     .help = "metres along the light's ray, 0 where lit; unknown with shadow: screen", .optional = true},
     {"roughness", RL_READ, RL_SCALAR, .help = "perceptual, 0 to 1", .optional = true},
     {"specular", RL_READ, RL_SCALAR, .help = "reflectance at normal incidence, 0 to 1", .optional = true},
     {"metallic", RL_READ, RL_SCALAR, .help = "0 to 1", .optional = true},
     {"emission", RL_READ, RL_RGB, .help = "emitted radiance", .optional = true},
     {"curvature", RL_READ, RL_SCALAR, .help = "1/m; only its amount counts, hollows scatter like hills",
      .optional = true, .needed_by = "diffuse: sg"},
-    {"smooth_normal", RL_READ, RL_NORMAL, .help = "diffuse: sg: normal without small bumps", .optional = true},
+    {"smooth_normal", RL_READ, RL_NORMAL, .help = "diffuse: sg: normal without small bumps",
+     .optional = true},
     {"diffuse", RL_WRITE, RL_RGB, .help = "radiance that entered a subsurface material", .any_layout = true},
     {"lit", RL_WRITE, RL_RGB, .help = "all other radiance, complete"},
 };

@@ -1,5 +1,5 @@
-/* Rows of the material table that more than one pass reads. A row is the same wherever it is declared, but for what
- * makes it required: that is the pass's own. */
+/* Rows of the material table that more than one pass reads. A row is the same wherever it is declared, but
+ * for what makes it required: that is the pass's own. */
 #ifndef RL_PASSES_SHADING_ROWS_H
 #define RL_PASSES_SHADING_ROWS_H
 
@@ -19,16 +19,18 @@ extern const rl_form rl_scatter_forms[RL_SCATTER_FORMS];
 #define RL_ROWS_SCATTER_PARAM                                                                                \
     M_ENUM(param, "scatter_distance|mean_free_path|mean_free_path_diffuse|cycles_radius|unreal_dmfp", 0,     \
            "in which numbers the profile's width is given, see scatter_distance_mm"),                        \
-    M(RL_RGBF, mean_free_path_mm, 1e-6, 1e6, 0, "mm", "mean free path l in the volume, a channel",           \
-      .no_default = true),                                                                                   \
-    M(RL_RGBF, cycles_radius_mm, 1e-6, 1e6, 0, "mm", "radius times scale of a Cycles material, a channel",                \
-      .source = "Blender, Subsurface Scattering node, Christensen-Burley", .no_default = true),              \
-    M(RL_RGBF, diffuse_mean_free_path_mm, 1e-6, 1e6, 0, "mm",                                                \
-      "diffuse mean free path l_d, a channel; in Unreal the product of its colour, distance and world unit scale", \
-      .no_default = true),                                                                                   \
-    M(RL_RGBF, albedo, 0, 1, 0, "ratio",                                                                     \
-      "reflectance A of the surface that the other renderer was told; only for the formulas of param",       \
-      .no_default = true)
+        M(RL_RGBF, mean_free_path_mm, 1e-6, 1e6, 0, "mm", "mean free path l in the volume, a channel",       \
+          .no_default = true),                                                                               \
+        M(RL_RGBF, cycles_radius_mm, 1e-6, 1e6, 0, "mm",                                                     \
+          "radius times scale of a Cycles material, a channel",                                              \
+          .source = "Blender, Subsurface Scattering node, Christensen-Burley", .no_default = true),          \
+        M(RL_RGBF, diffuse_mean_free_path_mm, 1e-6, 1e6, 0, "mm",                                            \
+          "diffuse mean free path l_d, a channel; in Unreal the product of its colour, distance and world "  \
+          "unit scale",                                                                                      \
+          .no_default = true),                                                                               \
+        M(RL_RGBF, albedo, 0, 1, 0, "ratio",                                                                 \
+          "reflectance A of the surface that the other renderer was told; only for the formulas of param",   \
+          .no_default = true)
 #define RL_ROW_TEXTURING                                                                                     \
     M_ENUM(texturing, "post|pre_post", 0, "albedo on the way out, or its square root on both ways",          \
            .source = "d'Eon 2007")
@@ -36,9 +38,10 @@ extern const rl_form rl_scatter_forms[RL_SCATTER_FORMS];
     M_ENUM(border, "renormalize|occlude", 0,                                                                 \
            "samples of other materials and outside of the image: not counted, or black")
 #define RL_ROW_DIFFUSE                                                                                       \
-    M_ENUM(diffuse, "disney|lambert|sg", 0,                                                                  \
-           "how light crosses the surface, in and out; sg: as lambert, and profiles scatter in the lighting",  \
-           .source = "Burley 2015; MJP")
+    M_ENUM(                                                                                                  \
+        diffuse, "disney|lambert|sg", 0,                                                                     \
+        "how light crosses the surface, in and out; sg: as lambert, and profiles scatter in the lighting",   \
+        .source = "Burley 2015; MJP")
 #define RL_ROW_EXIT_TRANSMISSION                                                                             \
     M_ENUM(exit_transmission, "sss|lighting", 0,                                                             \
            "where the way out is applied: behind the filter, or before it as in the talk",                   \

@@ -18,10 +18,12 @@ static const rl_param params[] = {
            "the disk is parallel to the screen, or to the tangent plane that the depth gives",
            .structural = true),
     P_ENUM(sss_burley_params, weighting, "area|plain|surface", 0,
-           "what a sample stands for: the area that its pixel sees, its pixel alone, or that area not normalized",
+           "what a sample stands for: the area that its pixel sees, its pixel alone, or that area not "
+           "normalized",
            .structural = true),
     P_ENUM(sss_burley_params, rotation, "none|white|ign|blue", 3,
-           "how the pattern changes from pixel to pixel and from frame to frame; blue: neighbours complement each other"),
+           "how the pattern changes from pixel to pixel and from frame to frame; blue: neighbours complement "
+           "each other"),
     P(sss_burley_params, RL_I32, seed, 0, 2147483647, 0, "", "another choice of patterns"),
 };
 RL_PARAMS_MATCH(sss_burley_params, 5);

@@ -19,11 +19,9 @@ extern const rl_pass rl_pass_sss_burley;
 
 enum { WIDTH = 1920, HEIGHT = 1080, REPEAT = 10 };
 
-static const twin_material materials[3] = {
-    {0, {0, 0, 0},          0, 0, {0}, 0, 0},
-    {1, {3.0f, 1.2f, 0.7f}, 0, 0, {0}, 0, 0},
-    {1, {6, 5, 3},          1, 0, {0}, 0, 0}
-};
+static const twin_material materials[3] = {{0, {0, 0, 0}, 0, 0, {0}, 0, 0},
+                                           {1, {3.0f, 1.2f, 0.7f}, 0, 0, {0}, 0, 0},
+                                           {1, {6, 5, 3}, 1, 0, {0}, 0, 0}};
 
 /* As peers/talk_sss.cl has it. */
 typedef struct peer_material {
@@ -46,11 +44,7 @@ static void fill(scene *s)
     static const struct {
         float x, y, radius;
         uint32_t id;
-    } balls[] = {
-        {680,  540, 530, 1},
-        {1540, 420, 300, 2},
-        {1450, 900, 170, 1}
-    };
+    } balls[] = {{680, 540, 530, 1}, {1540, 420, 300, 2}, {1450, 900, 170, 1}};
     size_t covered = 0;
     for (int y = 0; y < HEIGHT; y++)
         for (int x = 0; x < WIDTH; x++) {
@@ -113,15 +107,10 @@ static double run_ours(cl_session *session, const scene *s, int taps, int repeat
     const struct {
         int32_t taps, orientation, weighting, rotation, seed;
     } params = {taps, 0, 1, 3, 0};
-    const cl_image images[] = {
-        {"diffuse", s->diffuse, NULL },
-        {"lit",     s->lit,     NULL },
-        {"albedo",  s->albedo,  NULL },
-        {"normal",  s->normal,  NULL },
-        {"depth",   s->depth,   NULL },
-        {"stencil", s->stencil, NULL },
-        {"color",   NULL,       color}
-    };
+    const cl_image images[] = {{"diffuse", s->diffuse, NULL}, {"lit", s->lit, NULL},
+                               {"albedo", s->albedo, NULL},   {"normal", s->normal, NULL},
+                               {"depth", s->depth, NULL},     {"stencil", s->stencil, NULL},
+                               {"color", NULL, color}};
     double ms[3] = {0};
     cl_job job = {
         &rl_pass_sss_burley, &s->frame, &params, materials, sizeof materials, images, 7, repeat, ms, 0};
@@ -162,23 +151,13 @@ static double run_talk(cl_session *session, const scene *s, int taps, int repeat
             peers[m].d[c] = materials[m].scatter_distance_mm[c] * 1e-3f;
     }
     memcpy(to_world, s->frame.camera.to_world, sizeof to_world);
-    const cl_buffer buffers[] = {
-        {s->diffuse, s->n * 12,       false},
-        {s->lit,     s->n * 12,       false},
-        {s->albedo,  s->n * 12,       false},
-        {s->normal,  s->n * 12,       false},
-        {s->depth,   s->n * 4,        false},
-        {s->stencil, s->n * 4,        false},
-        {s->talk,    s->n * 12,       true },
-        {table,      sizeof table,    false},
-        {peers,      sizeof peers,    false},
-        {to_world,   sizeof to_world, false}
-    };
+    const cl_buffer buffers[] = {{s->diffuse, s->n * 12, false}, {s->lit, s->n * 12, false},
+                                 {s->albedo, s->n * 12, false},  {s->normal, s->n * 12, false},
+                                 {s->depth, s->n * 4, false},    {s->stencil, s->n * 4, false},
+                                 {s->talk, s->n * 12, true},     {table, sizeof table, false},
+                                 {peers, sizeof peers, false},   {to_world, sizeof to_world, false}};
     char *text = talk_text(s, taps);
-    size_t global[2] =
-        {
-            (size_t)s->frame.columns, (size_t)s->frame.rows
-    },
+    size_t global[2] = {(size_t)s->frame.columns, (size_t)s->frame.rows},
            best_local[2][2] = {{64, 1}, {8, 4}};
     double best = -1;
     for (int i = 0; i < 2 && text; i++) { /* the local size that suits it better */

@@ -74,7 +74,8 @@ scene_camera scene_camera_default(void); /* 72 x 48 */
 /* `lights` are bits of SCENE_LIGHTS; `shadowed` those of key and rim whose shadow counts. */
 scene scene_make(const scene_camera *camera, unsigned lights, unsigned shadowed);
 void scene_free(scene *s);
-/* The id of what a ray meets first, at a parameter in (0, end); 0 = nothing. The floor ends at parameter 5. */
+/* The id of what a ray meets first, at a parameter in (0, end); 0 = nothing. The floor ends at parameter 5.
+ */
 uint32_t scene_first(const double *from, const double *ray, double end);
 /* The id of what a point is inside of, or 0. */
 uint32_t scene_inside(const double *p);

@@ -153,10 +153,7 @@ void cl_harness_release(cl_kernel_of_pass **k)
 
 frame_t cl_harness_frame(int columns, int rows)
 {
-    frame_t f = {
-        .columns = columns, .rows = rows, .valid = {0, 0, columns, rows},
-                .stride = columns
-    };
+    frame_t f = {.columns = columns, .rows = rows, .valid = {0, 0, columns, rows}, .stride = columns};
     f.plane = columns * rows;
     f.stride4 = columns / 4 + 2 * RL_MARGIN4;
     f.plane4 = 4 * rows * f.stride4;

@@ -23,7 +23,9 @@ static void add_field(rl_str *s, const char *group, const rl_param *row)
 {
     const char *type = row->type == RL_F32 || row->type == RL_RGBF ? "float" : "int";
     rl_str_printf(s, "%s %s%s%s%s; ", type, group, *group ? "_" : "", row->name,
-                  row->type == RL_RGBF ? "[3]" : row->type == RL_MATERIALS ? "[8]" : "");
+                  row->type == RL_RGBF        ? "[3]"
+                  : row->type == RL_MATERIALS ? "[8]"
+                                              : "");
 }
 
 static bool add_row(void *ctx, const char *group, const rl_param *row, size_t word)

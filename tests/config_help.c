@@ -73,14 +73,14 @@ typedef struct blur_params {
 static const rl_param blur_rows[] = {
     P(blur_params, RL_F32, radius, 0, 8, 1.5, "mm", "half width"),
     {.name = "taps",
-                                                                  .type = RL_I32,
-                                                                  .offset = offsetof(blur_params, taps),
-                                                                  .min = 1,
-                                                                  .max = 4096,
-                                                                  .def = {-1},
-                                                                  .words = "auto|most",
-                                                                  .unit = "",
-                                                                  .help = "samples"},
+     .type = RL_I32,
+     .offset = offsetof(blur_params, taps),
+     .min = 1,
+     .max = 4096,
+     .def = {-1},
+     .words = "auto|most",
+     .unit = "",
+     .help = "samples"},
     P_ENUM(blur_params, shape, "disk|square", 0, "of the window"),
     P(blur_params, RL_BOOL, wrap, 0, 1, 0, "", "at the edges"),
     P(blur_params, RL_RGBF, tint, 0, 1, 1, "ratio", "a factor"),
@@ -88,16 +88,14 @@ static const rl_param blur_rows[] = {
 RL_PARAMS_MATCH(blur_params, 7);
 
 static const rl_port blur_ports[] = {
-    {"color",                      RL_READ, RL_RGB,    .help = "what is blurred"         },
-    {"depth",                      RL_READ, RL_SCALAR, .help = "metres",                   .optional = true},
-    {"last",                            RL_HISTORY,                              RL_RGB,  .help = "the past", .of = "color"},
-    {"rows",               RL_SCRATCH,                      RL_RGB,                          .help = "between the steps"                                   },
-    {"color", RL_WRITE,        RL_RGB,.help = "blurred"},
+    {"color", RL_READ, RL_RGB, .help = "what is blurred"},
+    {"depth", RL_READ, RL_SCALAR, .help = "metres", .optional = true},
+    {"last", RL_HISTORY, RL_RGB, .help = "the past", .of = "color"},
+    {"rows", RL_SCRATCH, RL_RGB, .help = "between the steps"},
+    {"color", RL_WRITE, RL_RGB, .help = "blurred"},
 };
 
-static const rl_step blur_steps[] = {
-    {"blur", .domain = RL_EVERY_PIXEL}
-};
+static const rl_step blur_steps[] = {{"blur", .domain = RL_EVERY_PIXEL}};
 
 static const rl_param blur_profile[] = {
     M(RL_RGBF, distance_mm, 1e-3, 1e3, 1, "mm", "how far", .required = true),
@@ -127,8 +125,8 @@ static const rl_param tint_shading[] = {
     M(RL_BOOL, transmission, 0, 1, 1, "", "through the surface"),
 };
 static const rl_port tint_ports[] = {
-    {"color", RL_READ,  RL_RGB, .help = "in" },
-    {"out",   RL_WRITE, RL_RGB, .help = "out"},
+    {"color", RL_READ, RL_RGB, .help = "in"},
+    {"out", RL_WRITE, RL_RGB, .help = "out"},
 };
 
 static const rl_pass tint = {

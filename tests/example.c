@@ -1,28 +1,29 @@
-/* The library from outside: compiled by test_install against an installed relit, it processes a frame that was made in memory
- * and prints the colour of its middle pixel. */
+/* The library from outside: compiled by test_install against an installed relit, it processes a frame that
+ * was made in memory and prints the colour of its middle pixel. */
 #include <graph/relit.h>
 #include <stdio.h>
 #include <stdlib.h>
 
 enum { W = 96, H = 64 };
 
-static const char pipeline[] = "relit: 1\n"
-                               "capture:\n"
-                               "  relit_capture: 1\n"
-                               "  name: made\n"
-                               "  files: memory\n"
-                               "  unit: m\n"
-                               "  camera: {matrix: header, forward: -z, fov_x: header, jitter: [0, 0]}\n"
-                               "  layers:\n"
-                               "    albedo: {channels: [R, G, B], colorspace: lin_rec709}\n"
-                               "    normal: {channels: [NX, NY, NZ], space: world, encoding: signed}\n"
-                               "    depth: {channels: [Z], kind: planar, empty: 1e10}\n"
-                               "    stencil: {channels: [ID]}\n"
-                               "materials: {default: {}}\n"
-                               "shading: {diffuse: lambert, specular: none}\n"
-                               "lights: {sun: {type: directional, direction: [0, 0, -1], irradiance: 3.14159265}}\n"
-                               "graph: {light: {pass: lighting}, c: {pass: combine, in: {diffuse: light.diffuse, lit: light.lit}}}\n"
-                               "outputs: {o: {image: c.color, file: 'o.{frame}.exr'}}\n";
+static const char pipeline[] =
+    "relit: 1\n"
+    "capture:\n"
+    "  relit_capture: 1\n"
+    "  name: made\n"
+    "  files: memory\n"
+    "  unit: m\n"
+    "  camera: {matrix: header, forward: -z, fov_x: header, jitter: [0, 0]}\n"
+    "  layers:\n"
+    "    albedo: {channels: [R, G, B], colorspace: lin_rec709}\n"
+    "    normal: {channels: [NX, NY, NZ], space: world, encoding: signed}\n"
+    "    depth: {channels: [Z], kind: planar, empty: 1e10}\n"
+    "    stencil: {channels: [ID]}\n"
+    "materials: {default: {}}\n"
+    "shading: {diffuse: lambert, specular: none}\n"
+    "lights: {sun: {type: directional, direction: [0, 0, -1], irradiance: 3.14159265}}\n"
+    "graph: {light: {pass: lighting}, c: {pass: combine, in: {diffuse: light.diffuse, lit: light.lit}}}\n"
+    "outputs: {o: {image: c.color, file: 'o.{frame}.exr'}}\n";
 
 static float plane[8][W * H];
 static uint32_t ids[W * H];
@@ -59,8 +60,8 @@ int main(void)
         return EXIT_FAILURE;
     }
     size_t middle = (size_t)(H / 2) * image.stride + W / 2;
-    printf("%s %dx%d %.4f %.4f %.4f\n", image.format, image.width, image.height, (double)image.plane[0][middle],
-           (double)image.plane[1][middle], (double)image.plane[2][middle]);
+    printf("%s %dx%d %.4f %.4f %.4f\n", image.format, image.width, image.height,
+           (double)image.plane[0][middle], (double)image.plane[1][middle], (double)image.plane[2][middle]);
     rl_session_close(&session);
     return EXIT_SUCCESS;
 }

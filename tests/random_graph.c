@@ -124,19 +124,13 @@ static size_t make_ports(maker *m, rl_port *ports, rl_node_input *inputs, size_t
 static void make_node(maker *m, size_t index, rl_node *node)
 {
     static const rl_step steps[] = {
-        {"a", .domain = RL_EVERY_PIXEL },
-        {"b", .domain = RL_EVERY_VECTOR},
-        {"c", .domain = RL_EVERY_PHASE }
-    };
+        {"a", .domain = RL_EVERY_PIXEL}, {"b", .domain = RL_EVERY_VECTOR}, {"c", .domain = RL_EVERY_PHASE}};
     rl_port *ports = rl_arena_array(m->arena, MOST_PORTS, sizeof *ports);
     rl_node_input *inputs = rl_arena_array(m->arena, MOST_PORTS, sizeof *inputs);
     rl_pass *pass = rl_arena_alloc(m->arena, sizeof *pass);
     assert_true(ports && inputs && pass);
     size_t n_inputs = 0, n = make_ports(m, ports, inputs, &n_inputs);
-    *pass = (rl_pass){
-        .name = "random", .ports = {ports,        n },
-             .steps = { steps, 1 + below(m, 3)}
-    };
+    *pass = (rl_pass){.name = "random", .ports = {ports, n}, .steps = {steps, 1 + below(m, 3)}};
     *node = (rl_node){numbered(m, "n", index), RL_NOWHERE, pass, NULL, inputs, n_inputs, NULL};
     for (size_t p = 0; p < n; p++)
         if (ports[p].role == RL_WRITE) {
@@ -148,12 +142,10 @@ static void make_node(maker *m, size_t index, rl_node *node)
 static void make_wanted(maker *m, size_t index, rl_wanted *wanted)
 {
     static const rl_port ports[] = {
-        {.name = "from",    .role = RL_READ,  .format = RL_RGB  },
-        { .name = "to", .role = RL_WRITE, .format = RL_RGB, .any_layout = true},
+        {.name = "from", .role = RL_READ, .format = RL_RGB},
+        {.name = "to", .role = RL_WRITE, .format = RL_RGB, .any_layout = true},
     };
-    static const rl_step steps[] = {
-        {"a", .domain = RL_EVERY_VECTOR}
-    };
+    static const rl_step steps[] = {{"a", .domain = RL_EVERY_VECTOR}};
     static const rl_pass convert = {.name = "convert", .ports = RL_ARRAY(ports), .steps = RL_ARRAY(steps)};
     static const int params[2];
     size_t n = 1 + below(m, 3);

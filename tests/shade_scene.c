@@ -108,7 +108,8 @@ static void make_pixel(const shade_scene *s, int x, int y, uint64_t *seed)
     for (int c = 0; c < 3; c++)
         *shade_at(&s->images[LIGHTING_SMOOTH_NORMAL], f, c, x, y) = smooth[c];
     double bend = shade_random(seed) - 0.3; /* radii of 0.4 mm to 1 m, hollows, planes */
-    *shade_at(&s->images[LIGHTING_CURVATURE], f, 0, x, y) = (float)(bend < -0.2 ? 0 : 2000 * bend * bend * bend);
+    *shade_at(&s->images[LIGHTING_CURVATURE], f, 0, x, y) =
+        (float)(bend < -0.2 ? 0 : 2000 * bend * bend * bend);
     int patch = (x / 7) * 31 + (y / 5) * 17;
     uint32_t id = patch % 8 == 0 || shade_random(seed) < 1.0 / 16 ? 0 : 1 + (uint32_t)(patch % 13);
     shade_set_id(&s->images[LIGHTING_STENCIL], f, x, y, id);

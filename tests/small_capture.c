@@ -51,12 +51,14 @@ const char small_pipeline[] =
     "  aovs: {layers: {diffuse: light.diffuse, depth: capture.depth, id: capture.stencil}, "
     "file: \"aov/{capture}.{frame:04}.exr\", compression: piz}\n";
 
-/* A slope that turns a little from frame to frame, skin on the left, plaster on the right, nothing at the top. */
+/* A slope that turns a little from frame to frame, skin on the left, plaster on the right, nothing at the
+ * top. */
 static void fill(float planes[PLANES][W * H], uint32_t *ids, int frame)
 {
     for (int i = 0; i < W * H; i++) {
         float x = (float)(i % W) / W, y = (float)(i / W) / H;
-        const float v[PLANES] = {0.8f * x, 0.5f, 0.4f * y, 0.6f, 0, 0.8f, 0.4f + 0.1f * x + 0.01f * (float)frame, x > 0.3f};
+        const float v[PLANES] = {
+            0.8f * x, 0.5f, 0.4f * y, 0.6f, 0, 0.8f, 0.4f + 0.1f * x + 0.01f * (float)frame, x > 0.3f};
         for (int p = 0; p < PLANES; p++)
             planes[p][i] = v[p];
         ids[i] = y < 0.2f ? 0 : x < 0.5f ? 1 : 2;
@@ -75,7 +77,8 @@ static void write_frame(const char *folder, int frame)
     rl_exr_source channels[N + 1];
     fill(planes, ids, frame);
     for (int i = 0; i < N; i++)
-        channels[i] = (rl_exr_source){.name = names[i], .type = RL_EXR_FLOAT, .floats = planes[i], .stride = W};
+        channels[i] =
+            (rl_exr_source){.name = names[i], .type = RL_EXR_FLOAT, .floats = planes[i], .stride = W};
     channels[N] = (rl_exr_source){.name = "stencil.ID", .type = RL_EXR_UINT, .ids = ids, .stride = W};
     const rl_exr_attribute attrs[] = {
         {"worldToCamera", {.type = RL_EXR_T_M44F, .v = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}}},
@@ -106,12 +109,14 @@ void small_capture_write(const char *folder)
     file_write(folder, "pipe.yaml", small_pipeline, strlen(small_pipeline));
 }
 
-/* ---- runs ------------------------------------------------------------------------------------------------ */
+/* ---- runs ------------------------------------------------------------------------------------------------
+ */
 
 static void check_error(const rl_error *err, rl_code code)
 {
     if (err->code != code || (code && !err->text[0]))
-        fail_msg("code %s came with %s and the text '%s'", rl_code_name(code), rl_code_name(err->code), err->text);
+        fail_msg("code %s came with %s and the text '%s'", rl_code_name(code), rl_code_name(err->code),
+                 err->text);
 }
 
 static void on_frame(void *ctx, const rl_frame_result *r)
@@ -144,7 +149,8 @@ small_run small_run_once(const char *folder, const char *out)
     check_error(&run.err, run.code);
     rl_session_close(&session);
     if (rl_alloc_live() != before)
-        fail_msg("%zu bytes are left (%s: %s)", rl_alloc_live() - before, rl_code_name(run.code), run.err.text);
+        fail_msg("%zu bytes are left (%s: %s)", rl_alloc_live() - before, rl_code_name(run.code),
+                 run.err.text);
     assert_int_equal(run.good + run.bad, run.summary.frames);
     assert_int_equal(run.bad, run.summary.failed);
     free(pipe);

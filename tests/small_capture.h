@@ -1,5 +1,6 @@
-/* A capture of three frames of 64 x 48 pixels that is written in a blink, a pipeline that uses most of the engine on it, and
- * runs of that pipeline whose results are checked: for tests of what goes wrong. Include cmocka.h first. */
+/* A capture of three frames of 64 x 48 pixels that is written in a blink, a pipeline that uses most of the
+ * engine on it, and runs of that pipeline whose results are checked: for tests of what goes wrong. Include
+ * cmocka.h first. */
 #ifndef RL_TESTS_SMALL_CAPTURE_H
 #define RL_TESTS_SMALL_CAPTURE_H
 
@@ -24,8 +25,8 @@ typedef struct small_run {
     rl_code frame_code[SMALL_FRAMES + 1];
 } small_run;
 
-/* Opens, prepares, runs and closes folder/pipe.yaml into `out`. Checks on the way: every error has a code and a text, a good
- * frame reports all its files, nothing that rl_alloc counts is left behind. */
+/* Opens, prepares, runs and closes folder/pipe.yaml into `out`. Checks on the way: every error has a code and
+ * a text, a good frame reports all its files, nothing that rl_alloc counts is left behind. */
 small_run small_run_once(const char *folder, const char *out);
 
 /* Every file in `out` is a whole image under a final name; returns how many. Fails the test otherwise. */

@@ -108,7 +108,8 @@ static void on_frame(void *ctx, const rl_frame_result *f)
     s->failed += f->error->code != RL_OK;
 }
 
-/* The least, not the mean: what the frames in flight happen to hold besides comes and goes with the threads; a leak stays. */
+/* The least, not the mean: what the frames in flight happen to hold besides comes and goes with the threads;
+ * a leak stays. */
 static double least(const size_t *values, size_t from, size_t to)
 {
     size_t m = values[from];

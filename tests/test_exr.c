@@ -75,14 +75,12 @@ static void picture_write(const picture *p, const char *path, rl_exr_box data, r
     for (int c = 0; c < CHANNELS; c++)
         sources[c] = (rl_exr_source){names[c], types[c], c == ID ? NULL : p->floats[c],
                                      c == ID ? p->ids : NULL, p->stride};
-    rl_exr_image image = {
-        .data_window = data,
-        .display_window = {0, 0, 99, 49},
-        .channels = sources,
-        .n_channels = CHANNELS,
-        .compression = compression,
-        .level = level
-    };
+    rl_exr_image image = {.data_window = data,
+                          .display_window = {0, 0, 99, 49},
+                          .channels = sources,
+                          .n_channels = CHANNELS,
+                          .compression = compression,
+                          .level = level};
     good(rl_exr_write(path, &image, pool, &clamped, &err), &err);
     assert_int_equal(clamped, 0);
 }
@@ -146,18 +144,8 @@ static void same_pictures(const picture *want, const picture *got, rl_exr_compre
 static void round_trips(void **state)
 {
     (void)state;
-    static const int sizes[][2] = {
-        {1,   1 },
-        {3,   5 },
-        {17,  33},
-        {64,  48},
-        {131, 70}
-    };
-    static const int corners[][2] = {
-        {0,  0  },
-        {-7, -13},
-        {20, 5  }
-    };
+    static const int sizes[][2] = {{1, 1}, {3, 5}, {17, 33}, {64, 48}, {131, 70}};
+    static const int corners[][2] = {{0, 0}, {-7, -13}, {20, 5}};
     for (int c = 0; c < RL_EXR_COMPRESSIONS; c++) {
         for (size_t s = 0; s < sizeof sizes / sizeof *sizes; s++) {
             int w = sizes[s][0], h = sizes[s][1];
@@ -255,13 +243,11 @@ static void clamping_is_counted(void **state)
         pixels[i] = i % 10 == 0 ? 1e6f : i % 10 == 5 ? -INFINITY : 1.0f;
     const rl_exr_source source = {"Y", RL_EXR_HALF, pixels, NULL, 2};
     for (int c = 0; c <= RL_EXR_ZIP; c++) {
-        const rl_exr_image image = {
-            .data_window = {0, 0, 1, 39},
-            .display_window = {0, 0, 1, 39},
-            .channels = &source,
-            .n_channels = 1,
-            .compression = (rl_exr_compression)c
-        };
+        const rl_exr_image image = {.data_window = {0, 0, 1, 39},
+                                    .display_window = {0, 0, 1, 39},
+                                    .channels = &source,
+                                    .n_channels = 1,
+                                    .compression = (rl_exr_compression)c};
         rl_error err = {0};
         uint64_t clamped = 0;
         rl_exr *file;
@@ -289,14 +275,12 @@ static void noise_is_stored_plain(void **state)
     const rl_exr_source source = {"id", RL_EXR_UINT, NULL, noise, W};
     for (int c = 0; c < RL_EXR_COMPRESSIONS; c++) {
         for (int level = 0; level <= 1; level++) {
-            const rl_exr_image image = {
-                .data_window = {0, 0, W - 1, H - 1},
-                .display_window = {0, 0, W - 1, H - 1},
-                .channels = &source,
-                .n_channels = 1,
-                .compression = (rl_exr_compression)c,
-                .level = level
-            };
+            const rl_exr_image image = {.data_window = {0, 0, W - 1, H - 1},
+                                        .display_window = {0, 0, W - 1, H - 1},
+                                        .channels = &source,
+                                        .n_channels = 1,
+                                        .compression = (rl_exr_compression)c,
+                                        .level = level};
             rl_error err = {0};
             rl_exr *file;
             char *bytes;

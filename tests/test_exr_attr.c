@@ -22,35 +22,33 @@ static const rl_exr_source source = {"Y", RL_EXR_FLOAT, pixel, NULL, 2};
 
 static rl_exr_image image_with(const rl_exr_attribute *attrs, size_t n)
 {
-    return (rl_exr_image){
-        .data_window = {3,  4,  4, 5},
-        .display_window = {-1, 0,   99, 49},
-        .channels = &source,
-        .n_channels = 1,
-        .compression = RL_EXR_ZIP,
-        .pixel_aspect = 2,
-        .screen_width = 0.5f,
-        .screen_center = {0.25f, -0.125f},
-        .attrs = attrs,
-        .n_attrs = n
-    };
+    return (rl_exr_image){.data_window = {3, 4, 4, 5},
+                          .display_window = {-1, 0, 99, 49},
+                          .channels = &source,
+                          .n_channels = 1,
+                          .compression = RL_EXR_ZIP,
+                          .pixel_aspect = 2,
+                          .screen_width = 0.5f,
+                          .screen_center = {0.25f, -0.125f},
+                          .attrs = attrs,
+                          .n_attrs = n};
 }
 
 static const rl_exr_attribute all[] = {
-    {"owner",           {RL_EXR_T_STRING, {0}, "relit\ttest"}                                              },
-    {"camera:fovx",     {RL_EXR_T_FLOAT, {0.5}, NULL}                                                      },
-    {"camera:jitter",   {RL_EXR_T_V2F, {0.25, -0.125}, NULL}                                               },
-    {"count",           {RL_EXR_T_INT, {-7}, NULL}                                                         },
-    {"precise",         {RL_EXR_T_DOUBLE, {0.1}, NULL}                                                     },
-    {"corner",          {RL_EXR_T_V2I, {-3, 2000000000}, NULL}                                             },
-    {"where",           {RL_EXR_T_V3F, {1, 2, 3}, NULL}                                                    },
-    {"worldToCamera",   {RL_EXR_T_M44F, {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16}, NULL}     },
-    {"exact",           {RL_EXR_T_M44D, {0.1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}, NULL}          },
-    {"turn",            {RL_EXR_T_M33F, {1, 2, 3, 4, 5, 6, 7, 8, 9}, NULL}                                 },
-    {"chromaticities",  {RL_EXR_T_CHROMATICITIES, {0.75, 0.25, 0.5, 0.5, 0.125, 0.0625, 0.25, 0.375}, NULL}},
-    {"timeCode",        {RL_EXR_T_TIMECODE, {0x01020304 + 64.0, 77}, NULL}                                 }, /* 01:02:03, frame 4, drop frame */
-    {"framesPerSecond", {RL_EXR_T_RATIONAL, {30000, 1001}, NULL}                                           },
-    {"region",          {RL_EXR_T_BOX2I, {1, 2, 3, 4}, NULL}                                               },
+    {"owner", {RL_EXR_T_STRING, {0}, "relit\ttest"}},
+    {"camera:fovx", {RL_EXR_T_FLOAT, {0.5}, NULL}},
+    {"camera:jitter", {RL_EXR_T_V2F, {0.25, -0.125}, NULL}},
+    {"count", {RL_EXR_T_INT, {-7}, NULL}},
+    {"precise", {RL_EXR_T_DOUBLE, {0.1}, NULL}},
+    {"corner", {RL_EXR_T_V2I, {-3, 2000000000}, NULL}},
+    {"where", {RL_EXR_T_V3F, {1, 2, 3}, NULL}},
+    {"worldToCamera", {RL_EXR_T_M44F, {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16}, NULL}},
+    {"exact", {RL_EXR_T_M44D, {0.1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}, NULL}},
+    {"turn", {RL_EXR_T_M33F, {1, 2, 3, 4, 5, 6, 7, 8, 9}, NULL}},
+    {"chromaticities", {RL_EXR_T_CHROMATICITIES, {0.75, 0.25, 0.5, 0.5, 0.125, 0.0625, 0.25, 0.375}, NULL}},
+    {"timeCode", {RL_EXR_T_TIMECODE, {0x01020304 + 64.0, 77}, NULL}}, /* 01:02:03, frame 4, drop frame */
+    {"framesPerSecond", {RL_EXR_T_RATIONAL, {30000, 1001}, NULL}},
+    {"region", {RL_EXR_T_BOX2I, {1, 2, 3, 4}, NULL}},
 };
 enum { ALL = sizeof all / sizeof *all };
 
@@ -107,20 +105,18 @@ static void round_trip(void **state)
 static void printed(void **state)
 {
     (void)state;
-    static const char *const want[][3] = {
-        {"owner",           "string",      "relit test"     },
-        {"camera:fovx",     "float",       "0.5"            },
-        {"camera:jitter",   "v2f",         "[0.25 -0.125]"  },
-        {"precise",         "double",      "0.1"            },
-        {"corner",          "v2i",         "[-3 2000000000]"},
-        {"timeCode",        "timecode",    "01:02:03;04"    },
-        {"framesPerSecond", "rational",    "30000/1001"     },
-        {"region",          "box2i",       "[1 2 3 4]"      },
-        {"channels",        "chlist",      "Y:float"        },
-        {"compression",     "compression", "zip"            },
-        {"dataWindow",      "box2i",       "[3 4 4 5]"      },
-        {"lineOrder",       "lineOrder",   "increasing y"   }
-    };
+    static const char *const want[][3] = {{"owner", "string", "relit test"},
+                                          {"camera:fovx", "float", "0.5"},
+                                          {"camera:jitter", "v2f", "[0.25 -0.125]"},
+                                          {"precise", "double", "0.1"},
+                                          {"corner", "v2i", "[-3 2000000000]"},
+                                          {"timeCode", "timecode", "01:02:03;04"},
+                                          {"framesPerSecond", "rational", "30000/1001"},
+                                          {"region", "box2i", "[1 2 3 4]"},
+                                          {"channels", "chlist", "Y:float"},
+                                          {"compression", "compression", "zip"},
+                                          {"dataWindow", "box2i", "[3 4 4 5]"},
+                                          {"lineOrder", "lineOrder", "increasing y"}};
     rl_error err = {0};
     rl_exr_image image = image_with(all, ALL);
     good(rl_exr_write(made_path("print.exr"), &image, NULL, NULL, &err), &err);
@@ -155,9 +151,7 @@ static void copied(void **state)
     rl_exr *from = open_file(made_path("from.exr"));
     static const char *const names[] = {"camera:*", "worldToCamera", "timeCode", "owner",
                                         "missing",  "dataWindow",    "comp*",    "framesPerSecond"};
-    const rl_exr_attribute own[] = {
-        {"owner", {RL_EXR_T_STRING, {0}, "somebody else"}}
-    };
+    const rl_exr_attribute own[] = {{"owner", {RL_EXR_T_STRING, {0}, "somebody else"}}};
     rl_exr_image copy = image_with(own, 1);
     copy.data_window = (rl_exr_box){0, 0, 1, 1};
     copy.compression = RL_EXR_RLE;

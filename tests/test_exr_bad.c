@@ -72,10 +72,7 @@ static void expect(const char *path, rl_code code, const char *text)
 static void make(const char *path, rl_exr_compression compression, int tile)
 {
     const made_channel channels[] = {
-        {"a", RL_EXR_HALF,  0, halves},
-        {"b", RL_EXR_FLOAT, 0, floats},
-        {"c", RL_EXR_UINT,  0, words }
-    };
+        {"a", RL_EXR_HALF, 0, halves}, {"b", RL_EXR_FLOAT, 0, floats}, {"c", RL_EXR_UINT, 0, words}};
     const made_part part = {NULL, -3, 5, W, H, compression, tile, false, false, channels, 3, NULL};
     if (compression < RL_EXR_DWAA) {
         made_write(path, &part, 1);
@@ -84,17 +81,12 @@ static void make(const char *path, rl_exr_compression compression, int tile)
     static float smooth[H * W];
     for (int i = 0; i < H * W; i++)
         smooth[i] = (float)(i % W) / W;
-    const rl_exr_source sources[] = {
-        {"R", RL_EXR_HALF, smooth, NULL,  W},
-        {"c", RL_EXR_UINT, NULL,   words, W}
-    };
-    const rl_exr_image image = {
-        .data_window = {0, 0, W - 1, H - 1},
-        .display_window = {0, 0, W - 1, H - 1},
-        .channels = sources,
-        .n_channels = 2,
-        .compression = compression
-    };
+    const rl_exr_source sources[] = {{"R", RL_EXR_HALF, smooth, NULL, W}, {"c", RL_EXR_UINT, NULL, words, W}};
+    const rl_exr_image image = {.data_window = {0, 0, W - 1, H - 1},
+                                .display_window = {0, 0, W - 1, H - 1},
+                                .channels = sources,
+                                .n_channels = 2,
+                                .compression = compression};
     rl_error err = {0};
     assert_int_equal(rl_exr_write(path, &image, pool, NULL, &err), RL_OK);
 }
@@ -159,13 +151,11 @@ static char *find_value(char *data, size_t size, const char *name, const char *t
 static void absurd_size(void **state)
 {
     (void)state;
-    const int32_t windows[][4] = {
-        {0,           0,         999999,     999999   },
-        {0,           0,         1000000000, 3        },
-        {-1073741000, 0,         1073741000, 0        },
-        {5,           5,         4,          4        },
-        {INT32_MIN,   INT32_MIN, INT32_MAX,  INT32_MAX}
-    };
+    const int32_t windows[][4] = {{0, 0, 999999, 999999},
+                                  {0, 0, 1000000000, 3},
+                                  {-1073741000, 0, 1073741000, 0},
+                                  {5, 5, 4, 4},
+                                  {INT32_MIN, INT32_MIN, INT32_MAX, INT32_MAX}};
     size_t size;
     make(made_path("whole.exr"), RL_EXR_ZIP, 0);
     char *data = get(made_path("whole.exr"), &size);
@@ -201,10 +191,7 @@ static void holes_in_the_table(void **state)
 static void cannot_be_read(void **state)
 {
     (void)state;
-    const made_channel channels[] = {
-        {"RY", RL_EXR_HALF, 2, halves},
-        {"Y",  RL_EXR_HALF, 0, halves}
-    };
+    const made_channel channels[] = {{"RY", RL_EXR_HALF, 2, halves}, {"Y", RL_EXR_HALF, 0, halves}};
     const made_part sampled = {NULL, 0, 0, 16, 16, RL_EXR_ZIP, 0, false, false, channels, 2, NULL};
     made_write(made_path("sampled.exr"), &sampled, 1);
     expect(made_path("sampled.exr"), RL_E_FORMAT, "'RY' is subsampled");
@@ -269,28 +256,19 @@ static void mutations(void **state)
 
 static rl_exr_image image_of(const rl_exr_source *sources, size_t n)
 {
-    return (rl_exr_image){
-        .data_window = {0, 0, W - 1, H - 1},
-        .display_window = {0, 0, W - 1, H - 1},
-        .channels = sources,
-        .n_channels = n,
-        .compression = RL_EXR_ZIP
-    };
+    return (rl_exr_image){.data_window = {0, 0, W - 1, H - 1},
+                          .display_window = {0, 0, W - 1, H - 1},
+                          .channels = sources,
+                          .n_channels = n,
+                          .compression = RL_EXR_ZIP};
 }
 
 static void bad_images(void **state)
 {
     (void)state;
-    const rl_exr_source twice[] = {
-        {"R", RL_EXR_HALF,  floats, NULL, W},
-        {"R", RL_EXR_FLOAT, floats, NULL, W}
-    };
-    const rl_exr_source wrong[] = {
-        {"R", RL_EXR_UINT, floats, NULL, W}
-    };
-    const rl_exr_attribute attr = {
-        "dataWindow", {RL_EXR_T_BOX2I, {0, 0, 1, 1}, NULL}
-    };
+    const rl_exr_source twice[] = {{"R", RL_EXR_HALF, floats, NULL, W}, {"R", RL_EXR_FLOAT, floats, NULL, W}};
+    const rl_exr_source wrong[] = {{"R", RL_EXR_UINT, floats, NULL, W}};
+    const rl_exr_attribute attr = {"dataWindow", {RL_EXR_T_BOX2I, {0, 0, 1, 1}, NULL}};
     rl_exr_image images[6];
     for (int i = 0; i < 6; i++)
         images[i] = image_of(twice, 1);
@@ -331,11 +309,9 @@ static void full_disk(void **state)
 static void allocations_fail(void **state)
 {
     (void)state;
-    const rl_exr_source sources[] = {
-        {"R", RL_EXR_HALF,  floats, NULL,  W},
-        {"c", RL_EXR_UINT,  NULL,   words, W},
-        {"d", RL_EXR_FLOAT, floats, NULL,  W}
-    };
+    const rl_exr_source sources[] = {{"R", RL_EXR_HALF, floats, NULL, W},
+                                     {"c", RL_EXR_UINT, NULL, words, W},
+                                     {"d", RL_EXR_FLOAT, floats, NULL, W}};
     for (int kind = 0; kind < 2 * RL_EXR_COMPRESSIONS; kind++) {
         rl_exr_image image = image_of(sources, 3);
         image.compression = (rl_exr_compression)(kind % RL_EXR_COMPRESSIONS);

@@ -82,10 +82,7 @@ static void vector_set_agrees(void **state)
     const rl_exr_kernels *a = &rl_exr_kernels_portable, *b = rl_exr_kernels_best();
     static uint16_t half_in[65536], half_a[65536], half_b[65536];
     static float float_a[65536], float_b[65536];
-    const rl_exr_fix fixes[] = {
-        {false, 0},
-        {true,  5}
-    };
+    const rl_exr_fix fixes[] = {{false, 0}, {true, 5}};
     uint32_t seed = 7;
     for (unsigned i = 0; i < 65536; i++)
         half_in[i] = (uint16_t)i;

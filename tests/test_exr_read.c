@@ -54,10 +54,7 @@ static uint32_t tiles_id[TILES_H][TILES_W];
 static double tiles_sum; /* of a */
 
 static const made_channel tile_channels[] = {
-    {"a",  RL_EXR_FLOAT, 0, tiles_a },
-    {"b",  RL_EXR_HALF,  0, tiles_b },
-    {"id", RL_EXR_UINT,  0, tiles_id}
-};
+    {"a", RL_EXR_FLOAT, 0, tiles_a}, {"b", RL_EXR_HALF, 0, tiles_b}, {"id", RL_EXR_UINT, 0, tiles_id}};
 
 static void fill_tiles(void)
 {
@@ -80,11 +77,9 @@ static void read_tiles(const rl_exr *file, int part)
         static float a[TILES_H][TILES_W], b[TILES_H][TILES_W];
         static uint32_t ids[TILES_H][TILES_W];
         memset(a, 0, sizeof a);
-        rl_exr_plane planes[] = {
-            {.channel = "id", .ids = &ids[0][0],  .stride = TILES_W},
-            {.channel = "b",  .floats = &b[0][0], .stride = TILES_W},
-            {.channel = "a",  .floats = &a[0][0], .stride = TILES_W}
-        };
+        rl_exr_plane planes[] = {{.channel = "id", .ids = &ids[0][0], .stride = TILES_W},
+                                 {.channel = "b", .floats = &b[0][0], .stride = TILES_W},
+                                 {.channel = "a", .floats = &a[0][0], .stride = TILES_W}};
         seen s = {.plane = &planes[2], .part = part, .width = TILES_W, .mutex = PTHREAD_MUTEX_INITIALIZER};
         good(rl_exr_read(file, part, planes, 3, &(rl_exr_rows){count_rows, &s}, pools[t], &err), &err);
         assert_memory_equal(a, tiles_a, sizeof a);
@@ -106,8 +101,9 @@ static void tiled_and_multipart(void **state)
     fill_tiles();
     for (int c = 0; c <= RL_EXR_PIZ; c++) {
         const made_part parts[] = {
-            {"beauty", 0,   0,  TILES_W, TILES_H, RL_EXR_ZIP,            0,    false, false, tile_channels, 3, NULL},
-            {"data",   -11, -3, TILES_W, TILES_H, (rl_exr_compression)c, TILE, true,  false, tile_channels, 3, NULL},
+            {"beauty", 0, 0, TILES_W, TILES_H, RL_EXR_ZIP, 0, false, false, tile_channels, 3, NULL},
+            {"data", -11, -3, TILES_W, TILES_H, (rl_exr_compression)c, TILE, true, false, tile_channels, 3,
+             NULL},
         };
         made_write(made_path("parts.exr"), parts, 2);
         rl_exr *file;
@@ -132,11 +128,7 @@ static void tiled_and_multipart(void **state)
 /* Rows of channels of one tile, compressed by the C++ library; returns the size. */
 static size_t pack_dwa_tile(int tx, int ty, int w, int h, uint8_t *packed, size_t room)
 {
-    static const rl_exr_layout layout[] = {
-        {"a",  RL_EXR_FLOAT},
-        {"b",  RL_EXR_HALF },
-        {"id", RL_EXR_UINT }
-    };
+    static const rl_exr_layout layout[] = {{"a", RL_EXR_FLOAT}, {"b", RL_EXR_HALF}, {"id", RL_EXR_UINT}};
     const rl_shim_exr_block block = {.layout = layout, .n_channels = 3, .width = w, .height = h};
     uint8_t plain[TILE * TILE * 10], *to = plain;
     char message[200];
@@ -205,10 +197,7 @@ static void one_channel_twice(void **state)
         id[i] = (uint32_t)i * 7;
         b[i] = made_half((float)(i % 100));
     }
-    const made_channel channels[] = {
-        {"b",  RL_EXR_HALF, 0, b },
-        {"id", RL_EXR_UINT, 0, id}
-    };
+    const made_channel channels[] = {{"b", RL_EXR_HALF, 0, b}, {"id", RL_EXR_UINT, 0, id}};
     for (int c = RL_EXR_NONE; c <= RL_EXR_ZIP; c++) {
         const made_part part = {NULL, 0, 0, W, H, (rl_exr_compression)c, 0, false, false, channels, 2, NULL};
         made_write(made_path("twice.exr"), &part, 1);
@@ -217,10 +206,8 @@ static void one_channel_twice(void **state)
         static uint32_t ids[H * W];
         static float floats[H * W];
         good(rl_exr_open(made_path("twice.exr"), 0, &file, &err), &err);
-        rl_exr_plane planes[] = {
-            {.channel = "id", .ids = ids,       .stride = W},
-            {.channel = "id", .floats = floats, .stride = W}
-        };
+        rl_exr_plane planes[] = {{.channel = "id", .ids = ids, .stride = W},
+                                 {.channel = "id", .floats = floats, .stride = W}};
         good(rl_exr_read(file, 0, planes, 2, NULL, NULL, &err), &err);
         assert_memory_equal(ids, id, sizeof id);
         for (int i = 0; i < W * H; i++)
@@ -241,10 +228,7 @@ static void nonfinite_values(void **state)
         f[i] = i % 7 == 0 ? NAN : i % 11 == 0 ? INFINITY : i % 13 == 0 ? -INFINITY : 1.0f;
         h[i] = i % 7 == 0 ? 0x7e01 : i % 11 == 0 ? 0x7c00 : i % 13 == 0 ? 0xfc00 : 0x3c00;
     }
-    const made_channel channels[] = {
-        {"f", RL_EXR_FLOAT, 0, f},
-        {"h", RL_EXR_HALF,  0, h}
-    };
+    const made_channel channels[] = {{"f", RL_EXR_FLOAT, 0, f}, {"h", RL_EXR_HALF, 0, h}};
     const made_part part = {NULL, 0, 0, W, H, RL_EXR_ZIPS, 0, false, false, channels, 2, NULL};
     made_write(made_path("nan.exr"), &part, 1);
     unsigned bad = 0, inf = 0;
@@ -257,11 +241,9 @@ static void nonfinite_values(void **state)
     good(rl_exr_open(made_path("nan.exr"), 0, &file, &err), &err);
     for (int t = 0; t < 3; t++) {
         static float out[3][H * W];
-        rl_exr_plane planes[] = {
-            {.channel = "f", .floats = out[0], .stride = W},
-            {.channel = "h", .floats = out[1], .stride = W},
-            {.channel = "h", .floats = out[2], .stride = W}
-        };
+        rl_exr_plane planes[] = {{.channel = "f", .floats = out[0], .stride = W},
+                                 {.channel = "h", .floats = out[1], .stride = W},
+                                 {.channel = "h", .floats = out[2], .stride = W}};
         planes[2].replace_inf = true;
         planes[2].inf_value = 1e10f;
         good(rl_exr_read(file, 0, planes, 3, NULL, pools[t], &err), &err);
@@ -307,19 +289,17 @@ static void ids_are_integers(void **state)
         float value;
         bool ok;
         uint32_t id;
-    } cases[] = {
-        {3,              true,  3          },
-        {16777216,       true,  16777216   },
-        {-1,             true,  0xffffffff },
-        {3e9f,           true,  3000000000u},
-        {-2147483648.0f, true,  0x80000000 },
-        {4294967040.0f,  true,  4294967040u},
-        {4294967296.0f,  false, 0          },
-        {2.5f,           false, 0          },
-        {NAN,            false, 0          },
-        {INFINITY,       false, 0          },
-        {-3e9f,          false, 0          }
-    };
+    } cases[] = {{3, true, 3},
+                 {16777216, true, 16777216},
+                 {-1, true, 0xffffffff},
+                 {3e9f, true, 3000000000u},
+                 {-2147483648.0f, true, 0x80000000},
+                 {4294967040.0f, true, 4294967040u},
+                 {4294967296.0f, false, 0},
+                 {2.5f, false, 0},
+                 {NAN, false, 0},
+                 {INFINITY, false, 0},
+                 {-3e9f, false, 0}};
     rl_error err;
     uint32_t id;
     float number;
@@ -351,7 +331,8 @@ static void limits(void **state)
 {
     (void)state;
     fill_tiles();
-    const made_part part = {NULL, 0, 0, TILES_W, TILES_H, RL_EXR_ZIP, 0, false, false, tile_channels, 3, NULL};
+    const made_part part = {NULL, 0,     0,     TILES_W,       TILES_H, RL_EXR_ZIP,
+                            0,    false, false, tile_channels, 3,       NULL};
     const uint64_t plane = sizeof tiles_a;
     made_write(made_path("limit.exr"), &part, 1);
     rl_exr *file;

@@ -1,5 +1,6 @@
-/* Every allocation and every OpenCL call fails once, the disk fills up, files cannot be written or read: a run never
- * crashes, leaks nothing, says what went wrong, writes the other frames, and leaves only whole files.
+/* Every allocation and every OpenCL call fails once, the disk fills up, files cannot be written or read: a
+ * run never crashes, leaks nothing, says what went wrong, writes the other frames, and leaves only whole
+ * files.
  *
  * By default a sample of the failures is tried; RELIT_FAULTS=all tries each (minutes). */
 #include <setjmp.h>
@@ -42,7 +43,8 @@ static void forget(char *out)
     folder_remove(out);
 }
 
-/* ---- the Nth call fails ---------------------------------------------------------------------------------- */
+/* ---- the Nth call fails ----------------------------------------------------------------------------------
+ */
 
 static unsigned long arm_memory(unsigned long n)
 {
@@ -95,7 +97,7 @@ static void try_all(unsigned long (*arm)(unsigned long), rl_code expected, int m
     }
     print_message("%lu calls, step %lu: %lu runs failed\n", total, step, failed);
     assert_true(failed > 5 && seen > 5); /* the injection works */
-    r = run_armed(arm, 0); /* and nothing stays broken */
+    r = run_armed(arm, 0);               /* and nothing stays broken */
     assert_int_equal(r.good, SMALL_FRAMES);
 }
 
@@ -117,7 +119,8 @@ static void test_opencl_fails_once(void **state)
     try_all(rl_device_fail_at, RL_E_DEVICE, 60, true);
 }
 
-/* ---- disks ----------------------------------------------------------------------------------------------- */
+/* ---- disks -----------------------------------------------------------------------------------------------
+ */
 
 /* No file can grow beyond `bytes`; 0 lifts the limit. A write beyond gives EFBIG. */
 static void limit_files(rlim_t bytes)
@@ -129,7 +132,8 @@ static void limit_files(rlim_t bytes)
     assert_int_equal(setrlimit(RLIMIT_FSIZE, &r), 0);
 }
 
-/* Files stop at every size up to what the largest output has: the header, the table of chunks, pixels, the last bytes. */
+/* Files stop at every size up to what the largest output has: the header, the table of chunks, pixels, the
+ * last bytes. */
 static void test_files_cannot_grow(void **state)
 {
     (void)state;
@@ -214,7 +218,8 @@ static void test_final_name_is_taken(void **state)
     forget(out);
 }
 
-/* ---- captures -------------------------------------------------------------------------------------------- */
+/* ---- captures --------------------------------------------------------------------------------------------
+ */
 
 /* The second frame is cut at every 16th of its length, or missing: the first and the third are written. */
 static void test_one_bad_frame(void **state)
@@ -241,7 +246,8 @@ static void test_one_bad_frame(void **state)
     free(path);
 }
 
-/* ---- main ------------------------------------------------------------------------------------------------ */
+/* ---- main ------------------------------------------------------------------------------------------------
+ */
 
 static int begin(void **state)
 {

@@ -1,5 +1,5 @@
-/* A few thousand inputs of each fuzz target (tests/fuzz): always the same ones. `make fuzz` tries more. A crash or a broken
- * promise ends this program and names the input. */
+/* A few thousand inputs of each fuzz target (tests/fuzz): always the same ones. `make fuzz` tries more. A
+ * crash or a broken promise ends this program and names the input. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

@@ -9,36 +9,34 @@
 #include "graph/base/alloc.h"
 #include "graph/model/graph.h"
 
-static const rl_step one_step[] = {
-    {"run", .domain = RL_EVERY_PIXEL}
-};
+static const rl_step one_step[] = {{"run", .domain = RL_EVERY_PIXEL}};
 #define FAKE(name_, ports_)                                                                                  \
     {                                                                                                        \
         .name = name_, .kernel = "f.cl", .ports = RL_ARRAY(ports_), .steps = RL_ARRAY(one_step)              \
     }
 
 static const rl_port light_ports[] = {
-    {PORT("albedo",     RL_READ,   RL_RGB)   },
-    {PORT("depth",      RL_READ,   RL_SCALAR)},
-    {PORT("thickness",  RL_READ,   RL_SCALAR), .optional = true},
-    {PORT("shadow",                 RL_READ,              RL_LIGHTS), .optional = true},
-    {PORT("diffuse", RL_WRITE,          RL_RGB),       .any_layout = true},
-    {PORT("lit",          RL_WRITE,RL_RGB)},
+    {PORT("albedo", RL_READ, RL_RGB)},
+    {PORT("depth", RL_READ, RL_SCALAR)},
+    {PORT("thickness", RL_READ, RL_SCALAR), .optional = true},
+    {PORT("shadow", RL_READ, RL_LIGHTS), .optional = true},
+    {PORT("diffuse", RL_WRITE, RL_RGB), .any_layout = true},
+    {PORT("lit", RL_WRITE, RL_RGB)},
 };
 static const rl_port sss_ports[] = {
-    {PORT("diffuse", RL_READ, RL_RGB),       .layout = RL_PHASE4},
-    {PORT("lit",              RL_READ,            RL_RGB)    },
-    {PORT("temp",              RL_SCRATCH,           RL_RGB)},
-    {PORT("color",              RL_WRITE,          RL_RGB)     },
+    {PORT("diffuse", RL_READ, RL_RGB), .layout = RL_PHASE4},
+    {PORT("lit", RL_READ, RL_RGB)},
+    {PORT("temp", RL_SCRATCH, RL_RGB)},
+    {PORT("color", RL_WRITE, RL_RGB)},
 };
 static const rl_port taa_ports[] = {
-    {PORT("color",   RL_READ,   RL_RGB)              },
-    {PORT("motion",  RL_READ,   RL_VEC2),              .optional = true},
-    {PORT("history",              RL_HISTORY,          RL_RGB),        .of = "color"},
-    {PORT("last_motion", RL_HISTORY,          RL_VEC2),       .of = "motion"},
-    {PORT("depth",      RL_READ,RL_SCALAR)      },
-    {PORT("last_z",  RL_HISTORY,          RL_SCALAR),                         .of = "depth"},
-    {PORT("color",   RL_WRITE,RL_RGB)},
+    {PORT("color", RL_READ, RL_RGB)},
+    {PORT("motion", RL_READ, RL_VEC2), .optional = true},
+    {PORT("history", RL_HISTORY, RL_RGB), .of = "color"},
+    {PORT("last_motion", RL_HISTORY, RL_VEC2), .of = "motion"},
+    {PORT("depth", RL_READ, RL_SCALAR)},
+    {PORT("last_z", RL_HISTORY, RL_SCALAR), .of = "depth"},
+    {PORT("color", RL_WRITE, RL_RGB)},
 };
 static const rl_port mix_ports[] = {
     {PORT("a", RL_READ, RL_RGB)},
@@ -47,16 +45,12 @@ static const rl_port mix_ports[] = {
 };
 static const rl_port view_ports[] = {{PORT("from", RL_READ, RL_RGB)}, {PORT("to", RL_WRITE, RL_RGB)}};
 static const rl_port lamps_ports[] = {{PORT("out", RL_WRITE, RL_LIGHTS)}};
-static const rl_port lost_ports[] = {
-    {PORT("color", RL_READ,    RL_RGB)},
-    {PORT("old",   RL_HISTORY, RL_RGB), .of = "colour"},
-    {PORT("out",            RL_WRITE,             RL_RGB)}
-};
-static const rl_port odd_ports[] = {
-    {PORT("color", RL_READ,    RL_RGB)   },
-    {PORT("old",   RL_HISTORY, RL_SCALAR), .of = "color"},
-    {PORT("out",            RL_WRITE,             RL_RGB)   }
-};
+static const rl_port lost_ports[] = {{PORT("color", RL_READ, RL_RGB)},
+                                     {PORT("old", RL_HISTORY, RL_RGB), .of = "colour"},
+                                     {PORT("out", RL_WRITE, RL_RGB)}};
+static const rl_port odd_ports[] = {{PORT("color", RL_READ, RL_RGB)},
+                                    {PORT("old", RL_HISTORY, RL_SCALAR), .of = "color"},
+                                    {PORT("out", RL_WRITE, RL_RGB)}};
 static const rl_pass light = FAKE("lighting", light_ports), sss = FAKE("sss_burley", sss_ports),
                      taa = FAKE("taa", taa_ports), mix = FAKE("mix", mix_ports),
                      view = FAKE("view", view_ports), lamps = FAKE("lamps", lamps_ports),
@@ -64,15 +58,15 @@ static const rl_pass light = FAKE("lighting", light_ports), sss = FAKE("sss_burl
                      idle = {.name = "idle", .ports = RL_ARRAY(view_ports)};
 
 static const rl_layer_info layers[] = {
-    {"albedo",     RL_RGB,    3},
-    {"depth",      RL_SCALAR, 1},
-    {"normal",     RL_NORMAL, 3},
+    {"albedo", RL_RGB, 3},
+    {"depth", RL_SCALAR, 1},
+    {"normal", RL_NORMAL, 3},
     {"shadow.key", RL_SCALAR, 1},
 };
 static const rl_layer_info with_shadow[] = {
-    {"albedo",    RL_RGB,    3},
-    {"depth",     RL_SCALAR, 1},
-    {"shadow",    RL_LIGHTS, 2},
+    {"albedo", RL_RGB, 3},
+    {"depth", RL_SCALAR, 1},
+    {"shadow", RL_LIGHTS, 2},
     {"thickness", RL_SCALAR, 0},
 };
 
@@ -117,9 +111,9 @@ static void expect_error(fixture *f, const rl_node *nodes, size_t n, int line, c
 }
 
 static const rl_node standard[] = {
-    {"light",                       AT(1), &light, NULL,                            NULL,   0, NULL},
-    {"sss",                             AT(2),                              &sss,   NULL, INPUTS({"diffuse", "light.diffuse", AT(3)}, {"lit", "light.lit", AT(4)})},
-    {"aa", AT(5),      &taa,         NULL,                                   INPUTS({"color", "sss.color", AT(6)})                               },
+    {"light", AT(1), &light, NULL, NULL, 0, NULL},
+    {"sss", AT(2), &sss, NULL, INPUTS({"diffuse", "light.diffuse", AT(3)}, {"lit", "light.lit", AT(4)})},
+    {"aa", AT(5), &taa, NULL, INPUTS({"color", "sss.color", AT(6)})},
 };
 
 /* The image on a node's port of that role. */
@@ -184,23 +178,18 @@ static void names_what_is_unknown(void **state)
     const rl_node past = {"aa", AT(2), &taa, NULL, INPUTS({"history", "capture.albedo", AT(3)})};
     expect_error(f, &past, 1, 3,
                  "pass 'aa' (taa): port 'history' is the past of port 'color' and takes no image of its own");
-    const rl_node node[] = {
-        standard[0], {"aa", AT(2), &taa, NULL, INPUTS({"color", "lihgt.lit", AT(3)})}
-    };
+    const rl_node node[] = {standard[0], {"aa", AT(2), &taa, NULL, INPUTS({"color", "lihgt.lit", AT(3)})}};
     expect_error(
         f, node, 2, 3,
         "pass 'aa' (taa): port 'color': no image 'lihgt.lit': the graph has no pass 'lihgt'; did you mean "
         "'light'? known: aa, capture, light");
-    const rl_node image[] = {
-        standard[0], {"aa", AT(2), &taa, NULL, INPUTS({"color", "light.difuse", AT(3)})}
-    };
+    const rl_node image[] = {standard[0],
+                             {"aa", AT(2), &taa, NULL, INPUTS({"color", "light.difuse", AT(3)})}};
     expect_error(
         f, image, 2, 3,
         "pass 'aa' (taa): port 'color': no image 'light.difuse': pass 'light' (lighting) does not write "
         "'difuse'; did you mean 'diffuse'? its images: diffuse, lit");
-    const rl_node bare[] = {
-        standard[0], {"aa", AT(2), &taa, NULL, INPUTS({"color", "light", AT(3)})}
-    };
+    const rl_node bare[] = {standard[0], {"aa", AT(2), &taa, NULL, INPUTS({"color", "light", AT(3)})}};
     expect_error(
         f, bare, 2, 3,
         "pass 'aa' (taa): port 'color': no image 'light': write 'light.IMAGE'; its images: diffuse, lit");
@@ -226,10 +215,7 @@ static void refuses_what_does_not_fit(void **state)
     fixture *f = *state;
     const rl_node wrong = {"aa", AT(2), &taa, NULL, INPUTS({"color", "capture.depth", AT(3)})};
     expect_error(f, &wrong, 1, 3, "pass 'aa' (taa): port 'color' takes rgb, 'capture.depth' is scalar");
-    const rl_layer_info flat[] = {
-        {"albedo", RL_SCALAR, 1},
-        {"depth",  RL_SCALAR, 1}
-    };
+    const rl_layer_info flat[] = {{"albedo", RL_SCALAR, 1}, {"depth", RL_SCALAR, 1}};
     assert_int_equal(rl_graph_build(&f->arena, standard, 1, flat, 2, NULL, 0, &f->graph, &f->err),
                      RL_E_CONFIG);
     const rl_node past = {"x", AT(2), &odd, NULL, INPUTS({"color", "capture.albedo", AT(3)})};
@@ -241,9 +227,7 @@ static void refuses_what_does_not_fit(void **state)
     expect_error(
         f, &many, 1, 2,
         "pass 'lamps' (lamps): port 'out' cannot be of type lights: only the capture has a plane a light");
-    const rl_node same[] = {
-        standard[0], {"light", AT(9), &light, NULL, NULL, 0, NULL}
-    };
+    const rl_node same[] = {standard[0], {"light", AT(9), &light, NULL, NULL, 0, NULL}};
     expect_error(f, same, 2, 9, "two passes are named 'light'");
     const rl_node capture = {"capture", AT(8), &light, NULL, NULL, 0, NULL};
     expect_error(f, &capture, 1, 8,
@@ -257,10 +241,10 @@ static void prints_cycles_whole(void **state)
     fixture *f = *state;
     /* data runs b -> c -> a -> b; d hangs on the cycle and is no part of it */
     const rl_node loop[] = {
-        {"d",    AT(1), &view, NULL,                                  INPUTS({"from", "a.out", AT(1)})},
-        { "a", AT(2),  &mix,  NULL, INPUTS({"a", "capture.albedo", AT(2)},           {"b", "c.out", AT(2)})},
-        { "b", AT(3),  &mix,  NULL,          INPUTS({"a", "a.out", AT(3)},  {"b", "capture.albedo", AT(3)})},
-        { "c", AT(4),  &mix,  NULL,          INPUTS({"a", "b.out", AT(4)},           {"b", "b.out", AT(4)})},
+        {"d", AT(1), &view, NULL, INPUTS({"from", "a.out", AT(1)})},
+        {"a", AT(2), &mix, NULL, INPUTS({"a", "capture.albedo", AT(2)}, {"b", "c.out", AT(2)})},
+        {"b", AT(3), &mix, NULL, INPUTS({"a", "a.out", AT(3)}, {"b", "capture.albedo", AT(3)})},
+        {"c", AT(4), &mix, NULL, INPUTS({"a", "b.out", AT(4)}, {"b", "b.out", AT(4)})},
     };
     expect_error(f, loop, 4, 2,
                  "the graph has a cycle: a -> b -> c -> a (only a history port may look back)");
@@ -275,23 +259,14 @@ static void converts_outputs(void **state)
     static const int srgb, p3;
     const rl_pass *const one[] = {&view}, *const two[] = {&view, NULL};
     const void *const with_srgb[] = {&srgb}, *const with_p3[] = {&p3}, *const mixed[] = {&p3, NULL};
-    const rl_output_layer color[] = {
-        {"", "aa.color", AT(20)}
-    };
-    const rl_output_layer both[] = {
-        {"beauty", "aa.color",      AT(21)},
-        {"z",      "capture.depth", AT(22)}
-    };
-    const rl_output_layer depth[] =
-        {
-            {"", "capture.depth", AT(23)}
-    },
-                          unknown[] = {{"", "aa.colr", AT(24)}};
+    const rl_output_layer color[] = {{"", "aa.color", AT(20)}};
+    const rl_output_layer both[] = {{"beauty", "aa.color", AT(21)}, {"z", "capture.depth", AT(22)}};
+    const rl_output_layer depth[] = {{"", "capture.depth", AT(23)}}, unknown[] = {{"", "aa.colr", AT(24)}};
     const rl_wanted wanted[] = {
-        {"plain", AT(20), color, NULL, NULL,      1},
-        {"a",     AT(20), color, one,  with_srgb, 1},
-        {"b",     AT(20), color, one,  with_srgb, 1},
-        {"c",     AT(21), both,  two,  mixed,     2},
+        {"plain", AT(20), color, NULL, NULL, 1},
+        {"a", AT(20), color, one, with_srgb, 1},
+        {"b", AT(20), color, one, with_srgb, 1},
+        {"c", AT(21), both, two, mixed, 2},
     };
     assert_int_equal(build(f, standard, 3, wanted, 4), RL_OK);
     const rl_graph *g = f->graph;
@@ -310,8 +285,9 @@ static void converts_outputs(void **state)
     const rl_wanted wrong = {"z", AT(23), depth, one, with_p3, 1},
                     gone = {"q", AT(24), unknown, NULL, NULL, 1};
     assert_int_equal(build(f, standard, 3, &wrong, 1), RL_E_CONFIG);
-    assert_string_equal(f->err.text, "output 'z': only rgb images are colour-converted, 'capture.depth' is scalar; leave out "
-                                     "colorspace, display, view, look and exposure");
+    assert_string_equal(
+        f->err.text, "output 'z': only rgb images are colour-converted, 'capture.depth' is scalar; leave out "
+                     "colorspace, display, view, look and exposure");
     assert_int_equal(f->err.line, 23);
     assert_int_equal(build(f, standard, 3, &gone, 1), RL_E_CONFIG);
     assert_string_equal(f->err.text,
@@ -332,7 +308,8 @@ static void takes_long_chains(void **state)
     for (int i = 0; i < N; i++) {
         inputs[i] = (rl_node_input){
             "from", i + 1 < N ? rl_arena_printf(&f->arena, "n%d.to", i + 1) : "capture.albedo", RL_NOWHERE};
-        nodes[i] = (rl_node){rl_arena_printf(&f->arena, "n%d", i), RL_NOWHERE, &view, NULL, &inputs[i], 1, NULL};
+        nodes[i] =
+            (rl_node){rl_arena_printf(&f->arena, "n%d", i), RL_NOWHERE, &view, NULL, &inputs[i], 1, NULL};
     }
     assert_int_equal(build(f, nodes, N, NULL, 0), RL_OK);
     inputs[N - 1].image = "n0.to";
@@ -347,9 +324,7 @@ static void survives_failing_memory(void **state)
     static const int p3;
     const rl_pass *const one[] = {&view};
     const void *const with_p3[] = {&p3};
-    const rl_output_layer color[] = {
-        {"", "aa.color", AT(20)}
-    };
+    const rl_output_layer color[] = {{"", "aa.color", AT(20)}};
     const rl_wanted wanted = {"a", AT(20), color, one, with_p3, 1};
     const rl_node typo = {"aa", AT(2), &taa, NULL, INPUTS({"color", "capture.albdo", AT(3)})};
     for (int wrong = 0; wrong < 2; wrong++)

@@ -51,7 +51,8 @@ static void program_runs_from_its_prefix(void **state)
 {
     (void)state;
     char command[1024], out[4096];
-    snprintf(command, sizeof command, "cd / && %s/bin/relit check %s/share/relit/configs/vignette.yaml --capture %s/captures/monkey",
+    snprintf(command, sizeof command,
+             "cd / && %s/bin/relit check %s/share/relit/configs/vignette.yaml --capture %s/captures/monkey",
              prefix, prefix, getcwd((char[512]){0}, 512));
     assert_int_equal(run(command, out, sizeof out), 0);
     assert_non_null(strstr(out, "OK"));

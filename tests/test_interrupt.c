@@ -1,5 +1,6 @@
-/* A run that is stopped at any moment leaves only whole files: by SIGTERM or SIGINT it finishes what is in flight, cleans up
- * and ends by that signal, soon; by SIGKILL it cannot clean up, but what has a final name is whole. */
+/* A run that is stopped at any moment leaves only whole files: by SIGTERM or SIGINT it finishes what is in
+ * flight, cleans up and ends by that signal, soon; by SIGKILL it cannot clean up, but what has a final name
+ * is whole. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -80,7 +81,8 @@ static void wait_for_files(const char *out, int n, double most_s)
 /* Before the signals are caught, while kernels are made, at the first file, and in full course. */
 static void stop_with(int number)
 {
-    const double delays[] = {0, 0.02, 0.05, 0.1, -1, -7, -20}; /* seconds after the start; < 0: after so many files */
+    const double delays[] = {0,  0.02, 0.05, 0.1,
+                             -1, -7,   -20}; /* seconds after the start; < 0: after so many files */
     for (size_t i = 0; i < sizeof delays / sizeof *delays; i++) {
         char *out = path_in(folder, "out");
         pid_t pid = start(out);
@@ -149,7 +151,8 @@ static int begin(void **state)
     (void)state;
     folder = folder_new();
     small_capture_write(folder);
-    char *one = text_replace(small_manifest, "s.####.exr", "s.0001.exr"), *many = text_replace(one, "frames: 1-3", "frames: 1-20000");
+    char *one = text_replace(small_manifest, "s.####.exr", "s.0001.exr"),
+         *many = text_replace(one, "frames: 1-3", "frames: 1-20000");
     file_write(folder, "capture.yaml", many, strlen(many));
     char *cache = path_in(folder, "cache");
     setenv("RELIT_CACHE", cache, 1);

@@ -48,9 +48,12 @@ static void test_many_layers(void **state)
 {
     (void)state;
     char text[32768];
-    int n = snprintf(text, sizeof text, "relit: 1\ncapture: capture.yaml\nmaterials: {default: {}}\noutputs:\n  o:\n    file: o.exr\n    layers:\n");
+    int n = snprintf(text, sizeof text,
+                     "relit: 1\ncapture: capture.yaml\nmaterials: {default: {}}\noutputs:\n  o:\n    file: "
+                     "o.exr\n    layers:\n");
     for (int i = 0; i < 300; i++)
-        n += snprintf(text + n, sizeof text - (size_t)n, "      l%d: %s\n", i, i % 2 ? "capture.depth" : "capture.albedo");
+        n += snprintf(text + n, sizeof text - (size_t)n, "      l%d: %s\n", i,
+                      i % 2 ? "capture.depth" : "capture.albedo");
     rl_exr *file = run_text(text);
     assert_int_equal(rl_exr_part_at(file, 0)->n_channels, 150 * 4 + 150); /* R G B A, and V */
     rl_exr_close(&file);
@@ -64,13 +67,16 @@ static void test_many_lights(void **state)
     char shadows[1024] = "shadow: {", lights[4096] = "lights:\n";
     for (int i = 0; i < LIGHTS; i++) {
         snprintf(shadows + strlen(shadows), sizeof shadows - strlen(shadows), "x%d: shadow.key, ", i);
-        snprintf(lights + strlen(lights), sizeof lights - strlen(lights), "  x%d: {type: point, position: [0, 0, %d], intensity: 1}\n", i, i);
+        snprintf(lights + strlen(lights), sizeof lights - strlen(lights),
+                 "  x%d: {type: point, position: [0, 0, %d], intensity: 1}\n", i, i);
     }
-    char *some = text_replace(small_manifest, "shadow: {", shadows), *all = text_replace(some, "lights:\n", lights);
+    char *some = text_replace(small_manifest, "shadow: {", shadows),
+         *all = text_replace(some, "lights:\n", lights);
     file_write(folder, "lights.yaml", all, strlen(all));
-    rl_exr *file = run_text("relit: 1\ncapture: lights.yaml\nmaterials: {default: {}}\n"
-                            "graph: {l: {pass: lighting}, c: {pass: combine, in: {diffuse: l.diffuse, lit: l.lit}}}\n"
-                            "outputs: {o: {layers: {s: capture.shadow, c: c.color}, file: o.exr}}\n");
+    rl_exr *file =
+        run_text("relit: 1\ncapture: lights.yaml\nmaterials: {default: {}}\n"
+                 "graph: {l: {pass: lighting}, c: {pass: combine, in: {diffuse: l.diffuse, lit: l.lit}}}\n"
+                 "outputs: {o: {layers: {s: capture.shadow, c: c.color}, file: o.exr}}\n");
     assert_int_equal(rl_exr_part_at(file, 0)->n_channels, LIGHTS + 1 + 4); /* and `key` itself */
     float first[SMALL_WIDTH * SMALL_HEIGHT], last[SMALL_WIDTH * SMALL_HEIGHT];
     rl_error err = {0};
@@ -88,12 +94,14 @@ static void test_many_lights(void **state)
 static void test_odd_file_names(void **state)
 {
     (void)state;
-    static const char kernel[] = "kernel void run(global const float *a, global float *b, constant frame_t *f, constant material_t *m)\n"
+    static const char kernel[] = "kernel void run(global const float *a, global float *b, constant frame_t "
+                                 "*f, constant material_t *m)\n"
                                  "{\n    b[get_global_id(0)] = a[get_global_id(0)];\n}\n";
-    static const char pipeline[] = "relit: 1\ncapture: capture.yaml\nmaterials: {default: {}}\n"
-                                   "graph: {k: {pass: kernel, file: \"od\\\"d \\\\n\\n: 1.cl\", entry: run, in: {a: capture.depth}, "
-                                   "ports: {a: {role: read, type: scalar}, b: {role: write, type: scalar}}}}\n"
-                                   "outputs: {o: {image: k.b, file: o.exr}}\n";
+    static const char pipeline[] =
+        "relit: 1\ncapture: capture.yaml\nmaterials: {default: {}}\n"
+        "graph: {k: {pass: kernel, file: \"od\\\"d \\\\n\\n: 1.cl\", entry: run, in: {a: capture.depth}, "
+        "ports: {a: {role: read, type: scalar}, b: {role: write, type: scalar}}}}\n"
+        "outputs: {o: {image: k.b, file: o.exr}}\n";
     static const char name[] = "od\"d \\n\n: 1.cl";
     file_write(folder, name, kernel, strlen(kernel));
     rl_exr *file = run_text(pipeline);

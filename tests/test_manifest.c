@@ -223,57 +223,57 @@ static void test_bad(void **state)
     static const struct {
         const char *text, *expected;
     } rows[] = {
-        {"relit_capture: 2\n",                                       "1:16: error: relit_capture: 2 is not known here; this relit reads 1"             },
+        {"relit_capture: 2\n", "1:16: error: relit_capture: 2 is not known here; this relit reads 1"},
         {"layer: {}\n",
          "1:1: error: a capture has no key 'layer'; did you mean 'layers'? known: camera, cuts, "
          "description, files, fps, frames, layers, license, lights, name, preset, relit_capture, "
-         "stencil_names, unit"                                                                                                                         },
-        {"files: []\n",                                              "1:8: error: 'files': expected a path, such as shot.####.exr, found an empty list"},
+         "stencil_names, unit"},
+        {"files: []\n", "1:8: error: 'files': expected a path, such as shot.####.exr, found an empty list"},
         {"fps: 24fps\nfiles: a.exr\n",
-         "1:6: error: 'fps': expected frames a second, such as 24 or 24000/1001, found the text '24fps'"                                               },
-        {"fps: 0\n",                                                 "1:6: error: 'fps' is 0: out of range, above 0 and at most 1e6"                   },
-        {"unit: inch\n",                                             "1:7: error: 'unit' cannot be 'inch'; known: cm, m, mm"                   },
-        {"unit: -1\n",                                               "1:7: error: 'unit' is -1: out of range, above 0"                                 },
+         "1:6: error: 'fps': expected frames a second, such as 24 or 24000/1001, found the text '24fps'"},
+        {"fps: 0\n", "1:6: error: 'fps' is 0: out of range, above 0 and at most 1e6"},
+        {"unit: inch\n", "1:7: error: 'unit' cannot be 'inch'; known: cm, m, mm"},
+        {"unit: -1\n", "1:7: error: 'unit' is -1: out of range, above 0"},
         {"camera: {forwards: -z}\n",
          "1:10: error: camera has no key 'forwards'; did you mean 'forward'? known: "
-         "forward, fov_x, jitter, matrix"                                                                                                              },
-        {"camera: {forward: z}\n",                                   "1:19: error: 'forward' cannot be 'z'; did you mean '-z'? known: "
-                                   "+z, -z"                                                                          },
-        {"camera: {fov_x: 180}\n",                                   "1:17: error: 'fov_x' is 180: out of range, 0.001 to 179.9"                       },
+         "forward, fov_x, jitter, matrix"},
+        {"camera: {forward: z}\n", "1:19: error: 'forward' cannot be 'z'; did you mean '-z'? known: "
+                                   "+z, -z"},
+        {"camera: {fov_x: 180}\n", "1:17: error: 'fov_x' is 180: out of range, 0.001 to 179.9"},
         {"camera: {fov_x: wide}\n",
-         "1:17: error: 'fov_x': expected header, degrees, or a list of degrees, found the text 'wide'"                                                 },
+         "1:17: error: 'fov_x': expected header, degrees, or a list of degrees, found the text 'wide'"},
         {"camera: {matrix: [1, 2]}\n",
-         "1:18: error: 'matrix': expected a list of 16 numbers, found a list of 2"                                                                     },
+         "1:18: error: 'matrix': expected a list of 16 numbers, found a list of 2"},
         {"camera: {matrix: [1,0,0,0, 0,1,0,0, 0,0,1,0, 3,4,5,1]}\n",
          "1:18: error: 'matrix': the last row must be 0, 0, 0, 1 (rows listed, for column vectors; a matrix "
          "for row "
-         "vectors is the transpose)"                                                                                                                   },
+         "vectors is the transpose)"},
         {"camera: {matrix: [1,0,0,0, 0,2,0,0, 0,0,1,0, 0,0,0,1]}\n",
-         "1:18: error: 'matrix' must rotate and shift only: rows 2 and 2 of its 3x3 have the dot product 4"                                            },
+         "1:18: error: 'matrix' must rotate and shift only: rows 2 and 2 of its 3x3 have the dot product 4"},
         {"camera: {jitter: 0.5}\n",
-         "1:18: error: 'jitter': expected header, [x, y], or a list of such pairs, found the number '0.5'"                                             },
-        {"files: a.exr\nframes: 8-1\n",                              "2:9: error: frames '8-1': 8-1 runs backwards"                                    },
+         "1:18: error: 'jitter': expected header, [x, y], or a list of such pairs, found the number '0.5'"},
+        {"files: a.exr\nframes: 8-1\n", "2:9: error: frames '8-1': 8-1 runs backwards"},
         {"files: a.exr\nframes: {}\n",
-         "2:9: error: 'frames': expected frames, such as 1-24 or [1, 5, 9], found an empty map"                                                        },
-        {"files: a.exr\nframes: []\n",                               "1:1: error: the capture has no frames"                                           },
-        {"files: a.exr\nname: a/b\n",                                "2:7: error: 'name' becomes part of file names: no '/', not empty"                },
+         "2:9: error: 'frames': expected frames, such as 1-24 or [1, 5, 9], found an empty map"},
+        {"files: a.exr\nframes: []\n", "1:1: error: the capture has no frames"},
+        {"files: a.exr\nname: a/b\n", "2:7: error: 'name' becomes part of file names: no '/', not empty"},
         {"files: {albedo: a.exr}\n",
-         "1:8: error: files: no file is given for layer 'normal' (nor a default)"                                                                      },
-        {"files: {default: a.exr, depht: b.exr}\n",                  "1:25: error: files: the capture has no layer 'depht'; "
+         "1:8: error: files: no file is given for layer 'normal' (nor a default)"},
+        {"files: {default: a.exr, depht: b.exr}\n", "1:25: error: files: the capture has no layer 'depht'; "
                                                     "did you mean 'depth'? known: albedo, default, depth, "
-                                                    "normal, stencil"                               },
+                                                    "normal, stencil"},
         {"files: a.exr\nframes: 1-3\ncamera: {fov_x: [30, 40]}\n",
-         "3:9: error: camera: 'fov_x' lists 2, but the capture has 3 frames"                                                                           },
-        {"files: a.exr\nstencil_names: {x: skin}\n",                 "2:17: error: stencil_names: 'x' is no 32-bit integer"                            },
+         "3:9: error: camera: 'fov_x' lists 2, but the capture has 3 frames"},
+        {"files: a.exr\nstencil_names: {x: skin}\n", "2:17: error: stencil_names: 'x' is no 32-bit integer"},
         {"files: a.exr\nstencil_names: {4294967296: skin}\n",
-         "2:17: error: stencil_names: '4294967296' is no 32-bit integer"                                                                               },
+         "2:17: error: stencil_names: '4294967296' is no 32-bit integer"},
         {"files: a.exr\nstencil_names: {1: skin, 0x1: wax}\n",
-         "2:26: error: stencil_names: the id 0x1 is named twice"                                                                                       },
+         "2:26: error: stencil_names: the id 0x1 is named twice"},
         {"preset: blander\n",
          "1:9: error: there is no preset 'blander'; did you mean 'blender'? known: arnold, "
-         "blender, relit"                                                                                                                              },
+         "blender, relit"},
         {"preset: ../presets/blender\n",
-         "1:9: error: there is no preset '../presets/blender'; known: arnold, blender, relit"                                                          },
+         "1:9: error: there is no preset '../presets/blender'; known: arnold, blender, relit"},
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++)
         refuse(with("%s%s", rows[i].text, layers), with("shots/capture.yaml:%s", rows[i].expected));
@@ -293,33 +293,31 @@ static void test_bad_layers(void **state)
         {"thicknes: T",
          "there is no layer 'thicknes'; did you mean 'thickness'? known: albedo, back_albedo, "
          "back_depth, back_normal, curvature, depth, emission, metallic, motion, normal, roughness, "
-         "shadow, shadow_thickness, specular, stencil, thickness"                                                                           },
+         "shadow, shadow_thickness, specular, stencil, thickness"},
         {"thickness: {chanels: [T]}",
          "layer 'thickness' has no key 'chanels'; did you mean 'channels'? known: "
-         "channels, part, remap, unit"                                                                                                      },
-        {"thickness: {unit: m}",                                     "layer 'thickness' needs 'channels'"                                   },
-        {"thickness: [a, b]",                                        "layer 'thickness': expected a list of 1 channel name"                 },
-        {"thickness: {channels: T, remap: [5, 1]}",                  "'remap' must be [min, max] with 0 <= min < max"                       },
-        {"emission: [a, b]",                                         "layer 'emission': expected a list of 3 channel names"                 },
-        {"emission: [a, [b], c]",                                    "'channels': expected the name of a channel, found a list of 1"        },
-        {"back_depth: {channels: D, kind: z}",                       "'kind' cannot be 'z'; known: device, planar, radial"          },
+         "channels, part, remap, unit"},
+        {"thickness: {unit: m}", "layer 'thickness' needs 'channels'"},
+        {"thickness: [a, b]", "layer 'thickness': expected a list of 1 channel name"},
+        {"thickness: {channels: T, remap: [5, 1]}", "'remap' must be [min, max] with 0 <= min < max"},
+        {"emission: [a, b]", "layer 'emission': expected a list of 3 channel names"},
+        {"emission: [a, [b], c]", "'channels': expected the name of a channel, found a list of 1"},
+        {"back_depth: {channels: D, kind: z}", "'kind' cannot be 'z'; known: device, planar, radial"},
         {"back_depth: {channels: D, kind: device, near: 1}",
-         "layer 'back_depth': device depth needs 'near' and 'far'"                                                                          },
+         "layer 'back_depth': device depth needs 'near' and 'far'"},
         {"back_depth: {channels: D, kind: device, near: 2, far: 2}",
-         "'far' is 2, but must be beyond 'near', which is 2"                                                                                },
-        {"back_depth: {channels: D, kind: device, near: 0, far: 2}", "'near' is 0: out of range, above 0"                                   },
+         "'far' is 2, but must be beyond 'near', which is 2"},
+        {"back_depth: {channels: D, kind: device, near: 0, far: 2}", "'near' is 0: out of range, above 0"},
         {"back_depth: {channels: D, kind: radial, near: 2}",
-         "layer 'back_depth': 'near' belongs to `kind: device`"                                                                             },
-        {"back_depth: {channels: D, empty: .nan}",                   "'empty' is .nan: a number is needed"                                  },
-        {"back_normal: {channels: [a, b, c], space: view}",
-         "'space' cannot be 'view'; known: camera, world"                                                                           },
+         "layer 'back_depth': 'near' belongs to `kind: device`"},
+        {"back_depth: {channels: D, empty: .nan}", "'empty' is .nan: a number is needed"},
+        {"back_normal: {channels: [a, b, c], space: view}", "'space' cannot be 'view'; known: camera, world"},
         {"back_normal: {channels: [a, b, c], encoding: octahedral}",
-         "layer 'back_normal': expected a list of 2 channel names"                                                                          },
-        {"motion: {channels: [a, b], unit: metres}",
-         "'unit' cannot be 'metres'; known: ndc, pixels, uv"                                                                        },
-        {"shadow: shadow.key",                                       "'shadow': expected a map, light: channel, found the text 'shadow.key'"},
-        {"shadow: {key: [a, b]}",                                    "layer 'shadow.key': expected a list of 1 channel name"                },
-        {"roughness: {channels: R, unit: m}",                        "layer 'roughness' has no key 'unit'; known: channels, part"           },
+         "layer 'back_normal': expected a list of 2 channel names"},
+        {"motion: {channels: [a, b], unit: metres}", "'unit' cannot be 'metres'; known: ndc, pixels, uv"},
+        {"shadow: shadow.key", "'shadow': expected a map, light: channel, found the text 'shadow.key'"},
+        {"shadow: {key: [a, b]}", "layer 'shadow.key': expected a list of 1 channel name"},
+        {"roughness: {channels: R, unit: m}", "layer 'roughness' has no key 'unit'; known: channels, part"},
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         rl_manifest *m;
@@ -483,16 +481,10 @@ static void test_names_from_files(void **state)
 {
     (void)state;
     static const char *const rows[][2] = {
-        {"monkey.####.exr",   "monkey" },
-        {"shots/a_%04d.exr",  "a"      },
-        {"x.exr",             "x"      },
-        {"monkey.0001.exr",   "monkey" },
-        {"take2.exr",         "take2"  },
-        {"####.exr",          "capture"},
-        {"a.b-####.left.exr", "a.b"    },
-        {"/abs/q####.exr",    "q"      },
-        {"100%d.exr",         "100"    },
-        {"100%.exr",          "100%"   },
+        {"monkey.####.exr", "monkey"}, {"shots/a_%04d.exr", "a"}, {"x.exr", "x"},
+        {"monkey.0001.exr", "monkey"}, {"take2.exr", "take2"},    {"####.exr", "capture"},
+        {"a.b-####.left.exr", "a.b"},  {"/abs/q####.exr", "q"},   {"100%d.exr", "100"},
+        {"100%.exr", "100%"},
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++)
         assert_string_equal(parse(with("files: '%s'\nframes: 1\n%s", rows[i][0], layers))->name, rows[i][1]);
@@ -539,34 +531,35 @@ static void test_bad_lights(void **state)
 {
     (void)state;
     static const char *const rows[][2] = {
-        {"{position: [0, 0, 0]}",                                                             "light 'k' needs 'type': point, spot or directional"                },
-        {"{type: sphere}",                                                                    "'type' cannot be 'sphere'; known: directional, point, spot"},
-        {"{type: point, intensity: 1}",                                                       "light 'k': a point light needs 'position'"                         },
-        {"{type: point, position: [0, 0, 0]}",                                                "light 'k' needs intensity, candela or lumen"                       },
+        {"{position: [0, 0, 0]}", "light 'k' needs 'type': point, spot or directional"},
+        {"{type: sphere}", "'type' cannot be 'sphere'; known: directional, point, spot"},
+        {"{type: point, intensity: 1}", "light 'k': a point light needs 'position'"},
+        {"{type: point, position: [0, 0, 0]}", "light 'k' needs intensity, candela or lumen"},
         {"{type: point, position: [0, 0, 0], lux: 3}",
-         "light 'k': a point light takes intensity, candela or lumen, not lux"                                                                                    },
+         "light 'k': a point light takes intensity, candela or lumen, not lux"},
         {"{type: point, position: [0, 0, 0], lumen: 3, candela: 2}",
-         "light 'k' has both candela and lumen; give one"                                                                                                         },
-        {"{type: point, position: [0, 0, 0], intensity: -1}",                                 "'intensity' is -1: out of range, at least 0"                       },
+         "light 'k' has both candela and lumen; give one"},
+        {"{type: point, position: [0, 0, 0], intensity: -1}", "'intensity' is -1: out of range, at least 0"},
         {"{type: point, position: [0, 0, 0], intensity: [1, 2]}",
-         "'intensity': expected a number or a list of 3 numbers, found a list of 2"                                                                               },
+         "'intensity': expected a number or a list of 3 numbers, found a list of 2"},
         {"{type: point, position: [0, 0, 0], intensity: .inf}",
-         "'intensity' is .inf: a finite number is needed"                                                                                                         },
+         "'intensity' is .inf: a finite number is needed"},
         {"{type: point, position: [0, 0, 0], intensity: 1, angle: 3}",
-         "light 'k': a point light has no 'angle'"                                                                                                                },
+         "light 'k': a point light has no 'angle'"},
         {"{type: point, position: [0, 0, 0], intensity: 1, direction: [0, 0, 1]}",
-         "light 'k': a point light has no 'direction'"                                                                                                            },
+         "light 'k': a point light has no 'direction'"},
         {"{type: directional, direction: [0, 0, 0], lux: 1}",
-         "light 'k': the direction has no usable length"                                                                                                          },
+         "light 'k': the direction has no usable length"},
         {"{type: spot, position: [0, 0, 0], direction: [0, 0, 1], intensity: 1}",
-         "light 'k': a spot light needs 'angle' (full, degrees)"                                                                                                  },
+         "light 'k': a spot light needs 'angle' (full, degrees)"},
         {"{type: spot, position: [0, 0, 0], direction: [0, 0, 1], angle: 180, intensity: 1}",
-         "'angle' is 180: out of range, 0.01 to 179.9"                                                                                                            },
-        {"{type: point, positon: [0, 0, 0]}",                                                 "light 'k' has no key 'positon'; did you mean 'position'? "
-                                              "known: angle, blend, candela, color, colorspace, "
-                                              "direction, efficacy, enabled, exposure, intensity, "
-                                              "irradiance, lumen, lux, position, shadow, space, temperature, tint, type"                },
-        {"bright",                                                                            "light 'k': expected a map, found the text 'bright'"                },
+         "'angle' is 180: out of range, 0.01 to 179.9"},
+        {"{type: point, positon: [0, 0, 0]}",
+         "light 'k' has no key 'positon'; did you mean 'position'? "
+         "known: angle, blend, candela, color, colorspace, "
+         "direction, efficacy, enabled, exposure, intensity, "
+         "irradiance, lumen, lux, position, shadow, space, temperature, tint, type"},
+        {"bright", "light 'k': expected a map, found the text 'bright'"},
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         rl_manifest *m;
@@ -580,20 +573,20 @@ static void test_bad_lights(void **state)
 /* ---- presets ---- */
 
 static const rl_channel blender[] = {
-    {NULL, "Back.Depth.Z"           },
-    {NULL, "Face.Combined.R"        },
-    {NULL, "Face.Depth.Z"           },
-    {NULL, "Face.DiffCol.B"         },
-    {NULL, "Face.DiffCol.G"         },
-    {NULL, "Face.DiffCol.R"         },
+    {NULL, "Back.Depth.Z"},
+    {NULL, "Face.Combined.R"},
+    {NULL, "Face.Depth.Z"},
+    {NULL, "Face.DiffCol.B"},
+    {NULL, "Face.DiffCol.G"},
+    {NULL, "Face.DiffCol.R"},
     {NULL, "Face.Denoising Albedo.R"},
-    {NULL, "Face.IndexMA.X"         },
-    {NULL, "Face.Normal.X"          },
-    {NULL, "Face.Normal.Y"          },
-    {NULL, "Face.Normal.Z"          },
-    {NULL, "Face.Vector.X"          },
-    {NULL, "Face.Vector.Y"          },
-    {NULL, "Face.Vector.Z"          },
+    {NULL, "Face.IndexMA.X"},
+    {NULL, "Face.Normal.X"},
+    {NULL, "Face.Normal.Y"},
+    {NULL, "Face.Normal.Z"},
+    {NULL, "Face.Vector.X"},
+    {NULL, "Face.Vector.Y"},
+    {NULL, "Face.Vector.Z"},
 };
 #define N(a) (sizeof(a) / sizeof *(a))
 
@@ -637,19 +630,19 @@ static void test_bare_file(void **state)
 {
     (void)state;
     static const rl_channel names[] = {
-        {"geo", "albedo.B"            },
-        {"geo", "albedo.G"            },
-        {"geo", "albedo.R"            },
-        {"geo", "depth.Z"             },
-        {"geo", "normal.X"            },
-        {"geo", "normal.Y"            },
-        {"geo", "normal.Z"            },
-        {"ids", "stencil.ID"          },
-        {"sh",  "shadow.key"          },
-        {"sh",  "shadow.rim"          },
-        {"sh",  "shadow_thickness.key"},
-        {"x",   "motion.X"            },
-        {"y",   "motion.Y"            },
+        {"geo", "albedo.B"},
+        {"geo", "albedo.G"},
+        {"geo", "albedo.R"},
+        {"geo", "depth.Z"},
+        {"geo", "normal.X"},
+        {"geo", "normal.Y"},
+        {"geo", "normal.Z"},
+        {"ids", "stencil.ID"},
+        {"sh", "shadow.key"},
+        {"sh", "shadow.rim"},
+        {"sh", "shadow_thickness.key"},
+        {"x", "motion.X"},
+        {"y", "motion.Y"},
     };
     rl_preset_match match;
     assert_int_equal(rl_preset_find(&arena, PRESETS, names, N(names), &match, &err), RL_OK);

@@ -6,12 +6,7 @@
 #include "graph/base/alloc.h"
 #include "graph/model/materials.h"
 
-static const rl_stencil_name names[] = {
-    {1,  "skin"   },
-    {2,  "plaster"},
-    {7,  "skin"   },
-    {-3, "wax"    }
-};
+static const rl_stencil_name names[] = {{1, "skin"}, {2, "plaster"}, {7, "skin"}, {-3, "wax"}};
 
 /* The sections of one text; blur and tint are the passes of the graph. */
 static rl_code resolve_used(const char *text, size_t n_names, size_t n_used, const rl_materials **out)
@@ -122,9 +117,8 @@ static void test_one_key_two_rows(void **state)
     assert_true(get(m, 2, "shading", "specular", 0) == 1);
     refuse("materials: {skin: {specular: 2}}",
            "t.yaml:1:30: error: 'specular': expected a number 0 … 1 (ratio), found the number '2'");
-    refuse("materials: {skin: {specular: gxg}}",
-           "t.yaml:1:30: error: 'specular' cannot be 'gxg'; did you "
-           "mean 'ggx'? known: ggx, none");
+    refuse("materials: {skin: {specular: gxg}}", "t.yaml:1:30: error: 'specular' cannot be 'gxg'; did you "
+                                                 "mean 'ggx'? known: ggx, none");
     refuse("materials: {skin: {specular: true}}",
            "t.yaml:1:30: error: 'specular': expected a number 0 … 1 (ratio), found true");
 }
@@ -146,13 +140,7 @@ static void test_ids(void **state)
     (void)state;
     const rl_materials *m =
         resolve("materials: {default: {}, plaster: {stencil: [4294967295, 5, wax]}, skin: {}}");
-    static const rl_stencil_id ids[] = {
-        {-3,         2},
-        {1,          3},
-        {5,          2},
-        {7,          3},
-        {4294967295, 2}
-    };
+    static const rl_stencil_id ids[] = {{-3, 2}, {1, 3}, {5, 2}, {7, 3}, {4294967295, 2}};
     assert_int_equal(m->other, 1);
     assert_int_equal(m->n_ids, RL_ARRAY_LENGTH(ids));
     for (size_t i = 0; i < m->n_ids; i++) {
@@ -254,8 +242,7 @@ static void test_wrong_keys(void **state)
            "'transmission'? known: specular, transmission");
     refuse("shading: {distance_mm: 1}", "t.yaml:1:11: error: shading has no key 'distance_mm'; it is a key "
                                         "of profiles; known: specular, transmission");
-    refuse("shading: {specular: 0.5}",
-           "t.yaml:1:21: error: 'specular' cannot be '0.5'; known: ggx, none");
+    refuse("shading: {specular: 0.5}", "t.yaml:1:21: error: 'specular' cannot be '0.5'; known: ggx, none");
     refuse("materials: {skin: {rougness: 1}}", "t.yaml:1:20: error: material 'skin' has no key 'rougness'; "
                                                "did you mean 'roughness'? known: profile, "
                                                "roughness, specular, stencil, transmission");

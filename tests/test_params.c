@@ -29,9 +29,7 @@ typedef union any {
 
 static any read_row(const char *row, const char *text)
 {
-    any out = {
-        {-77, -77, -77}
-    };
+    any out = {{-77, -77, -77}};
     config_assert_fine(rl_param_read(row_of(row), config_parse(text), &out, &config_error));
     return out;
 }
@@ -180,13 +178,13 @@ static void test_printing(void **state)
 {
     (void)state;
     static const char *const values[][3] = {
-        {"radius", "0.05",         "0.05"        },
-        {"radius", "5.0",          "5"           },
-        {"taps",   "4096",         "4096"        },
-        {"taps",   "most",         "most"        },
-        {"shape",  "square",       "square"      },
-        {"wrap",   "true",         "true"        },
-        {"tint",   "[1, 0, 0.25]", "[1, 0, 0.25]"},
+        {"radius", "0.05", "0.05"},
+        {"radius", "5.0", "5"},
+        {"taps", "4096", "4096"},
+        {"taps", "most", "most"},
+        {"shape", "square", "square"},
+        {"wrap", "true", "true"},
+        {"tint", "[1, 0, 0.25]", "[1, 0, 0.25]"},
     };
     for (size_t i = 0; i < RL_ARRAY_LENGTH(values); i++) {
         any value = read_row(values[i][0], values[i][1]);
@@ -200,11 +198,9 @@ static void test_describing(void **state)
 {
     (void)state;
     static const char *const texts[][2] = {
-        {"radius", "0 … 8, default 1.5 mm"           },
-        {"taps",   "auto|most|1 … 4096, default auto"},
-        {"shape",  "disk|square, default disk"         },
-        {"wrap",   "true|false, default false"         },
-        {"tint",   "0 … 1, default [1, 1, 1] ratio"  },
+        {"radius", "0 … 8, default 1.5 mm"},        {"taps", "auto|most|1 … 4096, default auto"},
+        {"shape", "disk|square, default disk"},     {"wrap", "true|false, default false"},
+        {"tint", "0 … 1, default [1, 1, 1] ratio"},
     };
     rl_str s = {0};
     for (size_t i = 0; i < RL_ARRAY_LENGTH(texts); i++) {

@@ -167,9 +167,7 @@ static void test_wrong_nodes(void **state)
 static void test_paths(void **state)
 {
     (void)state;
-    rl_value v = {
-        .kind = RL_TEXT, .text = "c.ocio", .where = {.file = "a/b/p.yaml", .line = 1}
-    };
+    rl_value v = {.kind = RL_TEXT, .text = "c.ocio", .where = {.file = "a/b/p.yaml", .line = 1}};
     assert_string_equal(rl_value_path(&config_arena, &v), "a/b/c.ocio");
     v.where.file = "--set color.config";
     assert_string_equal(rl_value_path(&config_arena, &v), "c.ocio");
@@ -189,15 +187,9 @@ static void test_output_defaults(void **state)
         rl_pixel_type type;
         const char *compression;
     } cases[] = {
-        {"a.exr",  RL_HALF,   "zip"},
-        {"a.EXR",  RL_HALF,   "zip"},
-        {"a.png",  RL_UINT8,  NULL },
-        {"a.tif",  RL_UINT16, "zip"},
-        {"a.jpg",  RL_UINT8,  NULL },
-        {"a.jpeg", RL_UINT8,  NULL },
-        {"a.tiff", RL_UINT16, "zip"},
-        {"a.hdr",  RL_FLOAT,  NULL },
-        {"a.webp", RL_UINT8,  NULL },
+        {"a.exr", RL_HALF, "zip"},    {"a.EXR", RL_HALF, "zip"}, {"a.png", RL_UINT8, NULL},
+        {"a.tif", RL_UINT16, "zip"},  {"a.jpg", RL_UINT8, NULL}, {"a.jpeg", RL_UINT8, NULL},
+        {"a.tiff", RL_UINT16, "zip"}, {"a.hdr", RL_FLOAT, NULL}, {"a.webp", RL_UINT8, NULL},
     };
     for (size_t i = 0; i < RL_ARRAY_LENGTH(cases); i++) {
         char keys[64];
@@ -316,9 +308,7 @@ static void test_wrong_outputs(void **state)
 static rl_code expand(const char *pattern, const char *capture, long long frame, const char *variant,
                       const char **out)
 {
-    const rl_output o = {
-        .file = pattern, .file_where = {.file = "t.yaml", .line = 3, .column = 4}
-    };
+    const rl_output o = {.file = pattern, .file_where = {.file = "t.yaml", .line = 3, .column = 4}};
     return rl_output_path(&config_arena, &o, capture, frame, variant, out, &config_error);
 }
 
@@ -330,13 +320,13 @@ static void test_patterns(void **state)
         long long frame;
         const char *path;
     } cases[] = {
-        {"plain.exr",                       1,     "plain.exr"                     },
-        {"{capture}.{frame:04}.exr",        7,     "monkey.0007.exr"               },
-        {"{capture}.{frame:04}.exr",        12345, "monkey.12345.exr"              },
-        {"{frame:04}",                      -3,    "-003"                          },
-        {"{frame}",                         -3,    "-3"                            },
-        {"{frame:4}",                       12,    "  12"                          },
-        {"{variant}/{capture}/{frame:018}", 5,     "post/monkey/000000000000000005"},
+        {"plain.exr", 1, "plain.exr"},
+        {"{capture}.{frame:04}.exr", 7, "monkey.0007.exr"},
+        {"{capture}.{frame:04}.exr", 12345, "monkey.12345.exr"},
+        {"{frame:04}", -3, "-003"},
+        {"{frame}", -3, "-3"},
+        {"{frame:4}", 12, "  12"},
+        {"{variant}/{capture}/{frame:018}", 5, "post/monkey/000000000000000005"},
     };
     for (size_t i = 0; i < RL_ARRAY_LENGTH(cases); i++) {
         const char *path = NULL;
@@ -349,19 +339,19 @@ static void test_wrong_patterns(void **state)
 {
     (void)state;
     static const char *const cases[][2] = {
-        {"{frame:x}",     "file '{frame:x}': after '{frame:' comes a width to 18, such as 4 or 04, not 'x'"  },
-        {"{frame:19}",    "file '{frame:19}': after '{frame:' comes a width to 18, such as 4 or 04, not '19'"},
+        {"{frame:x}", "file '{frame:x}': after '{frame:' comes a width to 18, such as 4 or 04, not 'x'"},
+        {"{frame:19}", "file '{frame:19}': after '{frame:' comes a width to 18, such as 4 or 04, not '19'"},
         {"{frame:}",
          "file '{frame:}' has the unknown field '{frame:}'; did you mean 'frame'? known: capture, frame, "
-         "variant"                                                                                           },
+         "variant"},
         {"{capture:3}",
          "file '{capture:3}' has the unknown field '{capture:3}'; did you mean 'capture'? known: capture, "
-         "frame, variant"                                                                                    },
-        {"{}",            "file '{}' has the unknown field '{}'; known: capture, frame, variant"             },
-        {"a{frame",       "file 'a{frame': '{' without its partner; fields look like {frame:04}"             },
-        {"a}b",           "file 'a}b': '}' without its partner; fields look like {frame:04}"                 },
-        {"{{frame}}",     "file '{{frame}}': '{' without its partner; fields look like {frame:04}"           },
-        {"{variant}.exr", "file '{variant}.exr': {variant} has no value here"                                },
+         "frame, variant"},
+        {"{}", "file '{}' has the unknown field '{}'; known: capture, frame, variant"},
+        {"a{frame", "file 'a{frame': '{' without its partner; fields look like {frame:04}"},
+        {"a}b", "file 'a}b': '}' without its partner; fields look like {frame:04}"},
+        {"{{frame}}", "file '{{frame}}': '{' without its partner; fields look like {frame:04}"},
+        {"{variant}.exr", "file '{variant}.exr': {variant} has no value here"},
     };
     for (size_t i = 0; i < RL_ARRAY_LENGTH(cases); i++) {
         const char *path;
@@ -504,9 +494,8 @@ static void test_wrong_ports(void **state)
     (void)state;
     enum { KEY = 91 }; /* the column of the second port */
     refuse_port("a: {role: read}", KEY, "port 'a' needs 'type': rgb|normal|vec2|scalar|id");
-    refuse_port(
-        "a: {role: reed, type: rgb}", KEY + 10,
-        "'role' cannot be 'reed'; did you mean 'read'? known: history, read, scratch, write");
+    refuse_port("a: {role: reed, type: rgb}", KEY + 10,
+                "'role' cannot be 'reed'; did you mean 'read'? known: history, read, scratch, write");
     refuse_port("a: {role: write, type: rgb, optional: true}", KEY + 38,
                 "port 'a': only a port that is read can be optional");
     refuse_port("a: {role: read, type: rgb, of: out}", KEY + 31,
@@ -550,8 +539,7 @@ static void test_wrong_params(void **state)
     refuse_param("g: {type: float, value: 1, words: [a]}", key + 34,
                  "parameter 'g': 'words' is for enum and int");
     refuse_param("g: {type: enum, value: a}", key, "parameter 'g' needs 'words': [one, another]");
-    refuse_param("g: {type: enum, value: a, words: [b]}", key + 23,
-                 "'g' cannot be 'a'; known: b");
+    refuse_param("g: {type: enum, value: a, words: [b]}", key + 23, "'g' cannot be 'a'; known: b");
     refuse_param("g: {type: enum, value: a, words: ['a|b']}", key + 34,
                  "'words': expected a word, found the text 'a|b'");
     refuse_param("entry: {type: float, value: 1}", key,

@@ -13,31 +13,21 @@
 #include "kernels/shared.h"
 #include "plan_simulator.h"
 
-static const rl_step one_step[] = {
-    {"run", .domain = RL_EVERY_VECTOR}
-};
+static const rl_step one_step[] = {{"run", .domain = RL_EVERY_VECTOR}};
 #define FAKE(name_, ports_)                                                                                  \
     {                                                                                                        \
         .name = name_, .ports = RL_ARRAY(ports_), .steps = RL_ARRAY(one_step)                                \
     }
-static const rl_port phase_ports[] = {
-    {PORT("from", RL_READ, RL_RGB),   .layout = RL_PHASE4},
-    {PORT("to",           RL_WRITE,          RL_RGB)}
-};
-static const rl_port free_ports[] = {
-    {PORT("from", RL_READ, RL_RGB)           },
-    { PORT("to",   RL_WRITE, RL_RGB), .any_layout = true}
-};
-static const rl_port past_ports[] = {
-    {PORT("from", RL_READ,    RL_RGB)},
-    {PORT("old",  RL_HISTORY, RL_RGB), .of = "from"},
-    {PORT("to",           RL_WRITE,             RL_RGB) }
-};
-static const rl_port past4_ports[] = {
-    {PORT("from",          RL_READ,    RL_RGB)},
-    {PORT("old",           RL_HISTORY, RL_RGB), .of = "from", .layout = RL_PHASE4},
-    {PORT("to", RL_WRITE,           RL_RGB)         }
-};
+static const rl_port phase_ports[] = {{PORT("from", RL_READ, RL_RGB), .layout = RL_PHASE4},
+                                      {PORT("to", RL_WRITE, RL_RGB)}};
+static const rl_port free_ports[] = {{PORT("from", RL_READ, RL_RGB)},
+                                     {PORT("to", RL_WRITE, RL_RGB), .any_layout = true}};
+static const rl_port past_ports[] = {{PORT("from", RL_READ, RL_RGB)},
+                                     {PORT("old", RL_HISTORY, RL_RGB), .of = "from"},
+                                     {PORT("to", RL_WRITE, RL_RGB)}};
+static const rl_port past4_ports[] = {{PORT("from", RL_READ, RL_RGB)},
+                                      {PORT("old", RL_HISTORY, RL_RGB), .of = "from", .layout = RL_PHASE4},
+                                      {PORT("to", RL_WRITE, RL_RGB)}};
 static const rl_port mix_ports[] = {
     {PORT("a", RL_READ, RL_RGB)}, {PORT("b", RL_READ, RL_RGB)}, {PORT("to", RL_WRITE, RL_RGB)}};
 static const rl_port narrow_ports[] = {{PORT("from", RL_READ, RL_RGB)}, {PORT("to", RL_WRITE, RL_SCALAR)}};
@@ -311,13 +301,11 @@ static void measures_windows(void **state)
 
     rl_error err = {0};
     assert_int_equal(rl_geometry_make(0, 0, 0, 5, &g, &err), RL_E_FORMAT);
-    static const int huge[][4] = {
-        {0,       0,       INT_MAX, INT_MAX},
-        {INT_MIN, INT_MIN, INT_MAX, INT_MAX},
-        {0,       0,       40000,   40000  },
-        {INT_MAX, INT_MAX, 1,       1      },
-        {0,       0,       INT_MAX, 1      }
-    };
+    static const int huge[][4] = {{0, 0, INT_MAX, INT_MAX},
+                                  {INT_MIN, INT_MIN, INT_MAX, INT_MAX},
+                                  {0, 0, 40000, 40000},
+                                  {INT_MAX, INT_MAX, 1, 1},
+                                  {0, 0, INT_MAX, 1}};
     for (size_t i = 0; i < RL_ARRAY_LENGTH(huge); i++)
         assert_int_equal(rl_geometry_make(huge[i][0], huge[i][1], huge[i][2], huge[i][3], &g, NULL),
                          RL_E_MEMORY);
@@ -332,13 +320,8 @@ static void refuses_what_int_cannot_index(void **state)
     const rl_node view[] = {NODE("a", &fake_view, "capture.albedo")};
     assert_int_equal(rl_plan_fits(PLAN(view, "a.to"), &g, NULL), RL_OK);
     const rl_layer_info layers[] = {
-        {"albedo", RL_RGB,    3 },
-        {"depth",  RL_SCALAR, 1 },
-        {"shadow", RL_LIGHTS, 40}
-    };
-    const rl_output_layer lit[] = {
-        {"", "light.lit", {0}}
-    };
+        {"albedo", RL_RGB, 3}, {"depth", RL_SCALAR, 1}, {"shadow", RL_LIGHTS, 40}};
+    const rl_output_layer lit[] = {{"", "light.lit", {0}}};
     const rl_wanted wanted = {.name = "lit", .layers = lit, .n_layers = 1};
     const rl_graph *graph = NULL;
     const rl_plan *plan = NULL;
@@ -354,9 +337,7 @@ static void survives_failing_memory(void **state)
     (void)state;
     for (unsigned long n = 1;; n++) {
         rl_arena separate = {0};
-        const rl_output_layer color[] = {
-            {"", "aa.color", {0}}
-        };
+        const rl_output_layer color[] = {{"", "aa.color", {0}}};
         const rl_wanted wanted = {.name = "color", .layers = color, .n_layers = 1};
         const rl_graph *graph = fake_graph(&arena, fake_nodes, 4, &wanted, 1);
         const rl_plan *plan = NULL;

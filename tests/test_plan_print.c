@@ -26,16 +26,9 @@ static int teardown(void **state)
 static const rl_plan *make(const char *preview)
 {
     static const rl_pass *const convert[] = {&fake_view};
-    static const rl_output_layer color[] = {
-        {"", "aa.color", {0}}
-    };
-    static const rl_output_layer aovs[] = {
-        {"d", "light.diffuse", {0}},
-        {"z", "capture.depth", {0}}
-    };
-    static const rl_output_layer toned[] = {
-        {"", "tone.to", {0}}
-    };
+    static const rl_output_layer color[] = {{"", "aa.color", {0}}};
+    static const rl_output_layer aovs[] = {{"d", "light.diffuse", {0}}, {"z", "capture.depth", {0}}};
+    static const rl_output_layer toned[] = {{"", "tone.to", {0}}};
     const rl_node nodes[] = {
         fake_nodes[0],
         fake_nodes[1],
@@ -44,9 +37,9 @@ static const rl_plan *make(const char *preview)
         {.name = "tone", .pass = &fake_view, INPUTS({"from", "aa.color", {0}})},
     };
     const rl_wanted wanted[] = {
-        {preview,  {0}, toned, convert, NULL, 1},
-        {"beauty", {0}, color, NULL,    NULL, 1},
-        {"aovs",   {0}, aovs,  NULL,    NULL, 2},
+        {preview, {0}, toned, convert, NULL, 1},
+        {"beauty", {0}, color, NULL, NULL, 1},
+        {"aovs", {0}, aovs, NULL, NULL, 2},
     };
     const rl_plan *plan = NULL;
     assert_int_equal(rl_plan_make(&arena, fake_graph(&arena, nodes, 5, wanted, 3), &plan, NULL), RL_OK);

@@ -67,7 +67,8 @@ static int lines(const char *text)
 /* ---- help ------------------------------------------------------------------------------------------------
  */
 
-static const char *const commands[] = {"run", "check", "plan", "init", "inspect", "passes", "devices", "bench"};
+static const char *const commands[] = {"run",     "check",  "plan",    "init",
+                                       "inspect", "passes", "devices", "bench"};
 
 static void expect_narrow(const char *text)
 {
@@ -94,7 +95,8 @@ static void test_help(void **state)
         expect(&one, 0);
         expect_narrow(one.out);
         assert_non_null(strstr(one.out, "--help"));
-        assert_true(!strstr(one.out, "--frames") == (i > 2 && i < 7)); /* only run, check, plan and bench take frames */
+        assert_true(!strstr(one.out, "--frames") ==
+                    (i > 2 && i < 7)); /* only run, check, plan and bench take frames */
         tool_result_free(&one);
     }
     tool_result_free(&r);

@@ -10,7 +10,8 @@ static void copy_tail(char *out, size_t size, const char *text)
     memcpy(out, from, strlen(from) + 1);
 }
 
-/* Names and values of users are quoted in messages: what would break the line or the terminal does not pass. */
+/* Names and values of users are quoted in messages: what would break the line or the terminal does not pass.
+ */
 void rl_one_line(char *text)
 {
     for (unsigned char *c = (unsigned char *)text; *c; c++) {

@@ -54,8 +54,9 @@ typedef struct rl_graph {
 
 /* An output that the graph must make: `layers[i]` names an image; `convert[i]` (may be NULL) is a pass with
  * one READ and one WRITE port, such as a colour transform, that is put between that image and the output as a
- * node of its own, "output.NAME" or, with several layers, "output.NAME.LAYER". An image of another format than
- * that port's stays as it is beside others in one file (data is not colour), and is an error on its own. */
+ * node of its own, "output.NAME" or, with several layers, "output.NAME.LAYER". An image of another format
+ * than that port's stays as it is beside others in one file (data is not colour), and is an error on its own.
+ */
 typedef struct rl_wanted {
     const char *name;
     rl_where where;
@@ -74,9 +75,10 @@ rl_code rl_graph_build(rl_arena *arena, const rl_node *nodes, size_t n_nodes, co
                        size_t n_layers, const rl_wanted *wanted, size_t n_wanted, const rl_graph **out,
                        rl_error *err);
 
-/* Fails where a material needs an optional port (rl_port.needed_by) or a key of its profile (rl_param.needed_by) that is absent: the
- * error names pass, material, and port and layer, or key. */
-rl_code rl_graph_check_needs(rl_arena *arena, const rl_graph *graph, const rl_materials *materials, rl_error *err);
+/* Fails where a material needs an optional port (rl_port.needed_by) or a key of its profile
+ * (rl_param.needed_by) that is absent: the error names pass, material, and port and layer, or key. */
+rl_code rl_graph_check_needs(rl_arena *arena, const rl_graph *graph, const rl_materials *materials,
+                             rl_error *err);
 
 /* The image of that name, "aa.color" or "capture.depth", or -1. */
 int rl_graph_find(const rl_graph *graph, const char *name);

@@ -19,9 +19,9 @@ static const struct {
     unsigned units;
     const char *wanted;
 } types[] = {
-    {"point",       true,  false, POINT_UNITS, "intensity, candela or lumen"},
-    {"spot",        true,  true,  POINT_UNITS, "intensity, candela or lumen"},
-    {"directional", false, true,  SUN_UNITS,   "irradiance or lux"          },
+    {"point", true, false, POINT_UNITS, "intensity, candela or lumen"},
+    {"spot", true, true, POINT_UNITS, "intensity, candela or lumen"},
+    {"directional", false, true, SUN_UNITS, "irradiance or lux"},
 };
 
 /* One number, or three. */
@@ -68,14 +68,15 @@ static rl_code read_temperature(const rl_value *v, rl_light_spec *l, rl_error *e
 {
     const rl_value *temperature = rl_value_get(v, "temperature"), *tint = rl_value_get(v, "tint");
     if (tint && !temperature)
-        return rl_fail(err, RL_E_CONFIG, tint->where, "light '%s': 'tint' is off the locus of a 'temperature'; give one",
-                       l->name);
+        return rl_fail(err, RL_E_CONFIG, tint->where,
+                       "light '%s': 'tint' is off the locus of a 'temperature'; give one", l->name);
     if (!temperature)
         return RL_OK;
     if (rl_value_get(v, "color"))
         return rl_fail(err, RL_E_CONFIG, temperature->where,
                        "light '%s' has both color and temperature; give one", l->name);
-    rl_code code = rl_value_number(temperature, "temperature", RL_KELVIN_LEAST, RL_KELVIN_MOST, &l->kelvin, err);
+    rl_code code =
+        rl_value_number(temperature, "temperature", RL_KELVIN_LEAST, RL_KELVIN_MOST, &l->kelvin, err);
     if (!code && tint)
         code = rl_value_number(tint, "tint", -RL_DUV_MOST, RL_DUV_MOST, &l->duv, err);
     return code;
@@ -165,10 +166,10 @@ static rl_code check_keys(const rl_value *v, const rl_light_spec *l, rl_error *e
         const char *key;
         bool used;
     } keys[] = {
-        {"position",  types[l->type].positioned},
-        {"direction", types[l->type].directed  },
-        {"angle",     l->type == RL_LIGHT_SPOT },
-        {"blend",     l->type == RL_LIGHT_SPOT },
+        {"position", types[l->type].positioned},
+        {"direction", types[l->type].directed},
+        {"angle", l->type == RL_LIGHT_SPOT},
+        {"blend", l->type == RL_LIGHT_SPOT},
     };
     for (size_t i = 0; i < sizeof keys / sizeof *keys; i++) {
         const rl_value *x = rl_value_get(v, keys[i].key);
@@ -181,9 +182,10 @@ static rl_code check_keys(const rl_value *v, const rl_light_spec *l, rl_error *e
 
 static rl_code read_light(const rl_entry *e, double metres, rl_light_spec *l, rl_error *err)
 {
-    static const char *const known[] = {"type",       "position", "direction", "angle", "blend", "intensity",
-                                        "irradiance", "candela",  "lumen",     "lux",   "color", "colorspace",
-                                        "efficacy",   "exposure", "enabled",   "space", "shadow", "temperature", "tint"};
+    static const char *const known[] = {"type",      "position",   "direction",   "angle",    "blend",
+                                        "intensity", "irradiance", "candela",     "lumen",    "lux",
+                                        "color",     "colorspace", "efficacy",    "exposure", "enabled",
+                                        "space",     "shadow",     "temperature", "tint"};
     const rl_value *v = e->value, *type = rl_value_get(v, "type");
     int t = 0;
     rl_str what = {0};

@@ -9,8 +9,9 @@
  *
  *     bulb: {type: point, position: …, candela: 80, temperature: 2700, tint: 0.003}
  *
- * `temperature` in place of `color`: a black body's of 1000 … 40000 K, `tint` off its locus by -0.05 … 0.05 in CIE 1960
- * u, v (positive is greener; D65 is 6504 K with 0.0032). It leaves the luminance as it is (temperature.h). */
+ * `temperature` in place of `color`: a black body's of 1000 … 40000 K, `tint` off its locus by -0.05 … 0.05
+ * in CIE 1960 u, v (positive is greener; D65 is 6504 K with 0.0032). It leaves the luminance as it is
+ * (temperature.h). */
 #ifndef RL_MODEL_LIGHTS_H
 #define RL_MODEL_LIGHTS_H
 

@@ -67,11 +67,7 @@ static rl_code read_texts(rl_manifest_reader *r, const rl_value *v)
     const struct {
         const char *key;
         const char **out;
-    } texts[] = {
-        {"name",        &m->name       },
-        {"description", &m->description},
-        {"license",     &m->license    }
-    };
+    } texts[] = {{"name", &m->name}, {"description", &m->description}, {"license", &m->license}};
     for (size_t i = 0; i < 3; i++) {
         const rl_value *t = rl_value_get(v, texts[i].key);
         rl_code code = t ? rl_value_text(t, texts[i].key, texts[i].out, r->err) : RL_OK;
@@ -108,11 +104,9 @@ static rl_code check_lengths(rl_manifest_reader *r)
         const char *name;
         rl_source source;
         size_t n;
-    } lists[] = {
-        {"matrix", c->matrix_source, c->n_matrix},
-        {"fov_x",  c->fov_source,    c->n_fov   },
-        {"jitter", c->jitter_source, c->n_jitter}
-    };
+    } lists[] = {{"matrix", c->matrix_source, c->n_matrix},
+                 {"fov_x", c->fov_source, c->n_fov},
+                 {"jitter", c->jitter_source, c->n_jitter}};
     for (size_t i = 0; i < 3; i++)
         if (lists[i].source == RL_SOURCE_LIST && lists[i].n != r->m->frames.n)
             return rl_fail(r->err, RL_E_CONFIG, c->where,

@@ -132,7 +132,7 @@ typedef struct rl_manifest {
     double fps;                        /* 0: not given */
     double unit;                       /* metres */
     rl_pattern *patterns;
-    int n_patterns;                    /* 0: `files: memory`, frames come through the C API */
+    int n_patterns;    /* 0: `files: memory`, frames come through the C API */
     rl_frames frames;  /* listed or found; {1} when no file is numbered */
     bool frames_found; /* by looking into the folder */
     rl_camera_spec camera;

@@ -153,7 +153,8 @@ rl_code rl_manifest_read_files(rl_manifest_reader *r, const rl_value *v)
         return rl_fail(r->err, RL_E_CONFIG, m->where, "a capture needs 'files', such as shot.####.exr");
     if (v->kind == RL_MAP && !v->n)
         return rl_value_wrong(v, "files", "a path or a map, layer: path", r->err);
-    if (v->kind == RL_TEXT && !strcmp(v->text, "memory")) /* frames come through the C API: no file, no pattern */
+    if (v->kind == RL_TEXT &&
+        !strcmp(v->text, "memory")) /* frames come through the C API: no file, no pattern */
         return RL_OK;
     size_t n = v->kind == RL_MAP ? v->n : 1;
     m->patterns = rl_arena_array(r->arena, n, sizeof *m->patterns);

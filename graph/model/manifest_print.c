@@ -194,7 +194,7 @@ static void print_light(const rl_light_spec *l, double unit, rl_str *s)
         double value, usual;
     } numbers[] = {
         {"efficacy", l->efficacy, 683},
-        {"exposure", l->exposure, 0  },
+        {"exposure", l->exposure, 0},
         {"temperature", l->kelvin, 0},
         {"tint", l->duv, 0},
     };

@@ -109,8 +109,10 @@ rl_code rl_ids_read(rl_id_list *list, rl_materials *m, unsigned dense, const rl_
     if (code || found)
         return code;
     if (list->n_names && !looks_like_one(list, entry->key)) {
-        rl_report(list->log, RL_WARNING, entry->where, "material '%s' is not in this capture: none of its %zu named ids is "
-                  "called so", entry->key, list->n_names);
+        rl_report(list->log, RL_WARNING, entry->where,
+                  "material '%s' is not in this capture: none of its %zu named ids is "
+                  "called so",
+                  entry->key, list->n_names);
         return RL_OK;
     }
     char *text = rl_arena_printf(list->arena, "material '%s' needs 'stencil' (an id): the capture %s",

@@ -24,8 +24,9 @@ typedef struct rl_id_list {
     size_t n, room;
 } rl_id_list;
 
-/* Reads the cover of the material `entry`, whose dense index is given. A material without `stencil` covers the id of its name;
- * where the capture names ids, but none like this one, the material is not in this capture: a warning. */
+/* Reads the cover of the material `entry`, whose dense index is given. A material without `stencil` covers
+ * the id of its name; where the capture names ids, but none like this one, the material is not in this
+ * capture: a warning. */
 rl_code rl_ids_read(rl_id_list *list, rl_materials *m, unsigned dense, const rl_entry *entry, rl_error *err);
 /* Sorts what was read into m->ids; two materials with one id are an error. */
 rl_code rl_ids_finish(rl_id_list *list, rl_materials *m, rl_error *err);

@@ -134,8 +134,8 @@ static rl_code check_required(reader *r, const rl_value *profile, const char *na
             bool asked = asks_for(r, row->required_with, entry);
             if ((row->required || asked) && !rl_value_get(profile, row->name) &&
                 !rl_forms_derived(r->m, row, entry))
-                return rl_fail(r->err, RL_E_CONFIG, where, "profile '%s' needs '%s' for pass %s%s%s%s: %s", name,
-                               row->name, r->used[i]->name, asked ? " (" : "",
+                return rl_fail(r->err, RL_E_CONFIG, where, "profile '%s' needs '%s' for pass %s%s%s%s: %s",
+                               name, row->name, r->used[i]->name, asked ? " (" : "",
                                asked ? row->required_with : "", asked ? ")" : "", row->help);
         }
     }
@@ -283,18 +283,16 @@ rl_code rl_materials_resolve_from(const rl_registry *registry, rl_arena *arena, 
     rl_materials *m = rl_arena_alloc(arena, sizeof *m);
     if (!m)
         return rl_fail_memory(err, sizeof *m);
-    reader r = {
-        .arena = arena,
-        .profiles = profiles,
-        .shading = shading,
-        .materials = materials,
-        .used = used,
-        .n_used = n_used,
-        .log = log,
-        .m = m,
-        .ids = {.arena = arena, .log = log, .names = names, .n_names = n_names},
-        .err = err
-    };
+    reader r = {.arena = arena,
+                .profiles = profiles,
+                .shading = shading,
+                .materials = materials,
+                .used = used,
+                .n_used = n_used,
+                .log = log,
+                .m = m,
+                .ids = {.arena = arena, .log = log, .names = names, .n_names = n_names},
+                .err = err};
     rl_code code = rl_material_rows(arena, registry, &m->rows, &m->n_rows, &m->entry_bytes, err);
     if (!code)
         code = need_map(&r, materials, "materials");

@@ -174,7 +174,8 @@ static rl_code check_material(const rl_param *row, const rl_value *v, rl_error *
     bool id = v->kind == RL_NUMBER && v->integral && v->integer >= INT32_MIN && v->integer <= UINT32_MAX;
     return id || v->kind == RL_TEXT
                ? RL_OK
-               : rl_value_wrong(v, row->name, "materials: names, stencil names or ids, or a list of them", err);
+               : rl_value_wrong(v, row->name, "materials: names, stencil names or ids, or a list of them",
+                                err);
 }
 
 rl_code rl_param_read(const rl_param *row, const rl_value *v, void *out, rl_error *err)

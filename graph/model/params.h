@@ -18,7 +18,8 @@ rl_code rl_fail_suggest(rl_error *err, rl_where where, const char *text, const c
 /* What a value of the row takes in a struct. */
 size_t rl_param_bytes(const rl_param *row);
 
-/* The default of a row, or -1 for .no_default rows, written to out (rl_param_bytes(row) bytes); lists are empty. */
+/* The default of a row, or -1 for .no_default rows, written to out (rl_param_bytes(row) bytes); lists are
+ * empty. */
 void rl_param_default(const rl_param *row, void *out);
 
 /* One value: type and range checked in double before narrowing, NaN refused, words known with did-you-mean.

@@ -38,7 +38,6 @@ rl_code rl_value_need(const rl_value *map, const char *key, const char *what, co
     return rl_fail(err, RL_E_CONFIG, where, "%s '%s' needs '%s': %s", what, name, key, remedy);
 }
 
-
 /* ---- nodes
  * --------------------------------------------------------------------------------------------------- */
 
@@ -235,8 +234,8 @@ static rl_code make_hash(parser *q)
 
 static rl_code read_sections(parser *q)
 {
-    static const char *const keys[] = {"relit",     "capture", "color", "profiles", "shading",
-                                       "materials", "lights",  "ambient", "graph", "outputs"};
+    static const char *const keys[] = {"relit",     "capture", "color",   "profiles", "shading",
+                                       "materials", "lights",  "ambient", "graph",    "outputs"};
     const rl_value *root = q->p->root, *include = rl_value_get(root, "include"), *outputs = NULL;
     if (root->kind != RL_MAP)
         return rl_value_wrong(root, "pipeline", "a map that starts with 'relit: 1'", q->err);

@@ -30,19 +30,19 @@ static const char exr_compressions[] = "zip|none|rle|zips|piz|pxr24|b44|b44a|dwa
 static const char tiff_compressions[] = "zip|none|lzw";
 
 static const file_type file_types[] = {
-    {".exr",  RL_HALF,   BIT(RL_HALF) | BIT(RL_FLOAT),                   exr_compressions,  1e4, "dwaa|dwab", "zip|zips", true },
-    {".png",  RL_UINT8,  BIT(RL_UINT8) | BIT(RL_UINT16),                 NULL,              0,   NULL,        "",         false},
-    {".tif",  RL_UINT16, BIT(RL_UINT8) | BIT(RL_UINT16) | BIT(RL_FLOAT), tiff_compressions, 0,   NULL,        "zip",
-     false                                                                                                                     },
-    {".tiff", RL_UINT16, BIT(RL_UINT8) | BIT(RL_UINT16) | BIT(RL_FLOAT), tiff_compressions, 0,   NULL,        "zip",
-     false                                                                                                                     },
-    {".jpg",  RL_UINT8,  BIT(RL_UINT8),                                  NULL,              100, NULL,        NULL,       false},
-    {".jpeg", RL_UINT8,  BIT(RL_UINT8),                                  NULL,              100, NULL,        NULL,       false},
-    {".webp", RL_UINT8,  BIT(RL_UINT8),                                  NULL,              100, NULL,        NULL,       false},
-    {".hdr",  RL_FLOAT,  BIT(RL_FLOAT),                                  NULL,              0,   NULL,        NULL,       false},
-    {".dpx",  RL_UINT16, BIT(RL_UINT8) | BIT(RL_UINT16),                 NULL,              0,   NULL,        NULL,       false},
-    {".tga",  RL_UINT8,  BIT(RL_UINT8),                                  NULL,              0,   NULL,        NULL,       false},
-    {".bmp",  RL_UINT8,  BIT(RL_UINT8),                                  NULL,              0,   NULL,        NULL,       false},
+    {".exr", RL_HALF, BIT(RL_HALF) | BIT(RL_FLOAT), exr_compressions, 1e4, "dwaa|dwab", "zip|zips", true},
+    {".png", RL_UINT8, BIT(RL_UINT8) | BIT(RL_UINT16), NULL, 0, NULL, "", false},
+    {".tif", RL_UINT16, BIT(RL_UINT8) | BIT(RL_UINT16) | BIT(RL_FLOAT), tiff_compressions, 0, NULL, "zip",
+     false},
+    {".tiff", RL_UINT16, BIT(RL_UINT8) | BIT(RL_UINT16) | BIT(RL_FLOAT), tiff_compressions, 0, NULL, "zip",
+     false},
+    {".jpg", RL_UINT8, BIT(RL_UINT8), NULL, 100, NULL, NULL, false},
+    {".jpeg", RL_UINT8, BIT(RL_UINT8), NULL, 100, NULL, NULL, false},
+    {".webp", RL_UINT8, BIT(RL_UINT8), NULL, 100, NULL, NULL, false},
+    {".hdr", RL_FLOAT, BIT(RL_FLOAT), NULL, 0, NULL, NULL, false},
+    {".dpx", RL_UINT16, BIT(RL_UINT8) | BIT(RL_UINT16), NULL, 0, NULL, NULL, false},
+    {".tga", RL_UINT8, BIT(RL_UINT8), NULL, 0, NULL, NULL, false},
+    {".bmp", RL_UINT8, BIT(RL_UINT8), NULL, 0, NULL, NULL, false},
 };
 
 /* One of "a|b|c", whatever the case. */

@@ -80,12 +80,8 @@ static rl_code want_images(rl_planner *p)
     if (!p->images)
         return rl_fail_memory(p->err, g->n_images * sizeof *p->images);
     for (size_t i = 0; i < g->n_images; i++)
-        p->images[i] = (rl_image_plan){
-            .reader = {INT_MAX, INT_MAX},
-              .now = {-1,      -1     },
-              .before = {-1,      -1     },
-              .sink = -1
-        };
+        p->images[i] =
+            (rl_image_plan){.reader = {INT_MAX, INT_MAX}, .now = {-1, -1}, .before = {-1, -1}, .sink = -1};
     for (size_t i = 0; i < p->n_live; i++)
         want_ports(p, (int)i);
     for (size_t o = 0; o < g->n_outputs; o++)

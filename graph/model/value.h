@@ -64,8 +64,8 @@ const char *rl_value_describe(const rl_value *v, char *buf);
 struct rl_str; /* graph/base/text.h */
 void rl_value_print(const rl_value *v, struct rl_str *out);
 
-/* The text of v as a path: relative to the file that v was read from; for a value of the command line (it has no
- * line) relative to the working folder. NULL when memory is out. */
+/* The text of v as a path: relative to the file that v was read from; for a value of the command line (it has
+ * no line) relative to the working folder. NULL when memory is out. */
 char *rl_value_path(rl_arena *arena, const rl_value *v);
 
 /* ---- changing (value.c) ---- */
@@ -84,8 +84,8 @@ rl_code rl_value_set(rl_arena *arena, rl_value **root, const char *path, rl_valu
 rl_code rl_value_keys(const rl_value *v, const char *what, const char *const *known, size_t n, rl_error *err);
 
 /* "<head> 'name'; did you mean 'y'? known: …", e.g. head "pass 'sss' (sss_burley) has no parameter". */
-rl_code rl_fail_unknown(rl_error *err, rl_where where, const char *head, const char *name, const char *const *known,
-                        size_t n);
+rl_code rl_fail_unknown(rl_error *err, rl_where where, const char *head, const char *name,
+                        const char *const *known, size_t n);
 
 /* "expected <expected>, found <describe>" at the place of v, with `name` in front: "'fov_x': expected …". */
 rl_code rl_value_wrong(const rl_value *v, const char *name, const char *expected, rl_error *err);

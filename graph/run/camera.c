@@ -27,7 +27,8 @@ rl_code rl_camera_make(const rl_camera_info *info, camera_t *out, rl_error *err)
     memset(out, 0, sizeof *out);
     for (int i = 0; i < 12; i++)
         if (!isfinite(view[i]))
-            return rl_fail(err, RL_E_DATA, RL_NOWHERE, "the camera's matrix holds a number that is not finite");
+            return rl_fail(err, RL_E_DATA, RL_NOWHERE,
+                           "the camera's matrix holds a number that is not finite");
     if (!invert(view, world))
         return rl_fail(err, RL_E_DATA, RL_NOWHERE, "the camera's matrix has no inverse");
     double width = info->fov_x != 0 ? 2 * tan(info->fov_x / 2) : info->screen_width;
@@ -43,7 +44,8 @@ rl_code rl_camera_make(const rl_camera_info *info, camera_t *out, rl_error *err)
     }
     out->focal[0] = (float)fx;
     out->focal[1] = (float)fy;
-    /* The shift is a part of the header's own screen window, also where the manifest gives the field of view. */
+    /* The shift is a part of the header's own screen window, also where the manifest gives the field of view.
+     */
     double window = info->screen_width > 0 ? info->screen_width : width;
     double shift_x = info->screen_center[0] * info->display[2] / window;
     double shift_y = info->screen_center[1] * info->display[2] / window * aspect;

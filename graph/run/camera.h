@@ -24,8 +24,8 @@ typedef struct rl_camera_info {
 /* RL_E_DATA when the matrix has no inverse or a number is not finite or out of range (fov in (0, pi)). */
 rl_code rl_camera_make(const rl_camera_info *info, camera_t *out, rl_error *err);
 
-/* True when b is so far from a that reprojection makes no sense: the view direction turned by more than 30 degrees, the
- * camera moved by more than `reach` metres, or the focal length changed by more than a half. */
+/* True when b is so far from a that reprojection makes no sense: the view direction turned by more than 30
+ * degrees, the camera moved by more than `reach` metres, or the focal length changed by more than a half. */
 bool rl_camera_jumped(const camera_t *a, const camera_t *b, double reach);
 
 #ifdef __cplusplus

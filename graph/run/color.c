@@ -100,13 +100,11 @@ static const rl_param params[] = {
 RL_PARAMS_MATCH(rl_color_params, 1);
 
 static const rl_port ports[] = {
-    {"in",  RL_READ,  RL_RGB, "colours in the working space",                          .layout = RL_LINEAR},
+    {"in", RL_READ, RL_RGB, "colours in the working space", .layout = RL_LINEAR},
     {"out", RL_WRITE, RL_RGB, "the same in another space, or as a display shows them", .layout = RL_LINEAR},
 };
 
-static const rl_step steps[] = {
-    {"color_apply", .domain = RL_EVERY_VECTOR}
-};
+static const rl_step steps[] = {{"color_apply", .domain = RL_EVERY_VECTOR}};
 
 static rl_code give_tables(const rl_pass_input *in, rl_arena *arena, rl_tables *out, rl_error *err)
 {

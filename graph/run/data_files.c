@@ -12,8 +12,8 @@
 #define RELIT_DATADIR "/usr/local/share/relit/configs"
 #endif
 
-/* The first parent of a file's folder, itself included, that has NAME in `configs` (a build tree: build/, build/tests/) or in
- * `share/relit/configs` (an installed one: bin/, lib/). */
+/* The first parent of a file's folder, itself included, that has NAME in `configs` (a build tree: build/,
+ * build/tests/) or in `share/relit/configs` (an installed one: bin/, lib/). */
 static const char *beside(rl_arena *arena, const char *file, const char *name)
 {
     static const char *const places[] = {"configs", "share/relit/configs"};

@@ -40,7 +40,7 @@ struct rl_memory {
     cl_mem mem;
     cl_mem seen; /* what kernels get: mem, or the part of it behind the guard */
     size_t bytes;
-    void *host;   /* host-memory devices: ours */
+    void *host; /* host-memory devices: ours */
     void *mapped;
     int maps; /* how often it is mapped */
 };
@@ -80,8 +80,8 @@ static bool injected(void)
 /* The call's status, or an injected failure without the call. */
 #define CL(call) (injected() ? CL_OUT_OF_RESOURCES : (call))
 
-/* The status of a wait. An injected failure comes behind the call: the device must not be at work on memory that the
- * caller then frees. */
+/* The status of a wait. An injected failure comes behind the call: the device must not be at work on memory
+ * that the caller then frees. */
 static cl_int waited(cl_int status)
 {
     return injected() ? CL_OUT_OF_RESOURCES : status;
@@ -306,9 +306,11 @@ static rl_code create_buffer(rl_memory *m, rl_error *err)
         if (!m->host)
             return rl_fail_memory(err, m->bytes);
         if (!injected())
-            m->mem = clCreateBuffer(d->context, CL_MEM_READ_WRITE | CL_MEM_USE_HOST_PTR, m->bytes, m->host, &status);
+            m->mem = clCreateBuffer(d->context, CL_MEM_READ_WRITE | CL_MEM_USE_HOST_PTR, m->bytes, m->host,
+                                    &status);
     } else if (!injected()) {
-        m->mem = clCreateBuffer(d->context, CL_MEM_READ_WRITE | CL_MEM_ALLOC_HOST_PTR, m->bytes, NULL, &status);
+        m->mem =
+            clCreateBuffer(d->context, CL_MEM_READ_WRITE | CL_MEM_ALLOC_HOST_PTR, m->bytes, NULL, &status);
     }
     return m->mem ? RL_OK : fail_cl(err, status, "a buffer cannot be made");
 }
@@ -414,8 +416,8 @@ static char cut_severity(const char **text)
     return 0;
 }
 
-/* A line of a compiler's log, "error: place: text" (PoCL) or "place: error: text" (clang): its severity, or 0. The
- * place, "file:line:column", is split in `line` itself. */
+/* A line of a compiler's log, "error: place: text" (PoCL) or "place: error: text" (clang): its severity, or
+ * 0. The place, "file:line:column", is split in `line` itself. */
 static char split_message(char *line, rl_where *where, const char **text)
 {
     const char *start = line;
@@ -440,7 +442,8 @@ static rl_code fail_build(rl_error *err, const char *name, char *log)
     const char *text, *what = NULL;
     char severity = 0;
     char *rest = NULL;
-    for (char *line = strtok_r(log, "\n", &rest); line && severity != 'e'; line = strtok_r(NULL, "\n", &rest)) {
+    for (char *line = strtok_r(log, "\n", &rest); line && severity != 'e';
+         line = strtok_r(NULL, "\n", &rest)) {
         char s = split_message(line, &where, &text);
         if (!s || (s == 'w' && severity))
             continue;
@@ -448,7 +451,8 @@ static rl_code fail_build(rl_error *err, const char *name, char *log)
         found = where;
         what = text;
     }
-    return rl_fail(err, RL_E_BUILD, found, what ? "%s" : "OpenCL program '%s' does not build", what ? what : name);
+    return rl_fail(err, RL_E_BUILD, found, what ? "%s" : "OpenCL program '%s' does not build",
+                   what ? what : name);
 }
 
 static rl_code build_log(rl_program *p, cl_int status, bool strict, rl_error *err)
@@ -584,7 +588,8 @@ static void read_span(rl_device *d, cl_event event, bool newest, rl_span *out)
     cl_ulong start = 0, end = 0;
     clGetEventProfilingInfo(event, CL_PROFILING_COMMAND_START, sizeof start, &start, NULL);
     clGetEventProfilingInfo(event, CL_PROFILING_COMMAND_END, sizeof end, &end, NULL);
-    if (newest) { /* it has just ended: close enough to line two clocks up, every time anew since they drift */
+    if (newest) { /* it has just ended: close enough to line two clocks up, every time anew since they drift
+                   */
         struct timespec now;
         clock_gettime(CLOCK_MONOTONIC, &now);
         d->clock_offset = (int64_t)now.tv_sec * 1000000000 + now.tv_nsec - (int64_t)end;

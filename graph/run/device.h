@@ -40,9 +40,9 @@ rl_code rl_device_open(const char *choice, int threads, const rl_log *log, rl_de
 void rl_device_close(rl_device **device);
 const rl_device_info *rl_device_about(const rl_device *device);
 
-/* A buffer, zeroed. Kernels get a pointer behind its first `guard` bytes (a multiple of 512, so that every device takes
- * the offset), the host's view starts at the first. On a host-memory device it is RL_ALIGN-aligned memory from rl_aligned, else device
- * memory. */
+/* A buffer, zeroed. Kernels get a pointer behind its first `guard` bytes (a multiple of 512, so that every
+ * device takes the offset), the host's view starts at the first. On a host-memory device it is
+ * RL_ALIGN-aligned memory from rl_aligned, else device memory. */
 rl_code rl_memory_new(rl_device *device, size_t bytes, size_t guard, rl_memory **out, rl_error *err);
 void rl_memory_free(rl_memory **memory);
 size_t rl_memory_bytes(const rl_memory *memory);
@@ -82,8 +82,8 @@ rl_code rl_device_run(rl_device *device, rl_program *program, const rl_dispatch 
 /* Waits until all that was enqueued is done. */
 rl_code rl_device_finish(rl_device *device, rl_error *err);
 
-/* For tests: the n-th OpenCL call from now fails with CL_OUT_OF_RESOURCES; 0 switches this off. Returns how many were left
- * of the n before, 0 when it has failed. */
+/* For tests: the n-th OpenCL call from now fails with CL_OUT_OF_RESOURCES; 0 switches this off. Returns how
+ * many were left of the n before, 0 when it has failed. */
 unsigned long rl_device_fail_at(unsigned long n);
 
 #ifdef __cplusplus

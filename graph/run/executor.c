@@ -104,8 +104,8 @@ static rl_code build_programs(rl_executor *x, int threads, rl_error *err)
     return code;
 }
 
-rl_code rl_executor_new(rl_device *device, const rl_plan *plan, const rl_materials *materials, bool march, int threads,
-                        const rl_log *log, rl_executor **out, rl_error *err)
+rl_code rl_executor_new(rl_device *device, const rl_plan *plan, const rl_materials *materials, bool march,
+                        int threads, const rl_log *log, rl_executor **out, rl_error *err)
 {
     *out = NULL;
     rl_executor *x = rl_calloc(1, sizeof *x);
@@ -180,8 +180,8 @@ rl_code rl_executor_resize(rl_executor *x, const rl_geometry *geometry, rl_error
     for (size_t i = 0; i < x->plan->n_buffers && !code; i++) {
         const rl_buffer *b = &x->plan->buffers[i];
         for (size_t half = 0; half < 2 && b->kind == RL_BUFFER_HISTORY && !code; half++)
-            code = rl_memory_new(x->device, rl_buffer_bytes(b, geometry), GUARD_BYTES, &x->history[2 * i + half],
-                                 err);
+            code = rl_memory_new(x->device, rl_buffer_bytes(b, geometry), GUARD_BYTES,
+                                 &x->history[2 * i + half], err);
     }
     if (code)
         free_images(x);

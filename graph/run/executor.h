@@ -17,10 +17,10 @@ typedef struct rl_executor rl_executor;
 /* The buffers that belong to one frame in flight: what its source fills and what its writers read. */
 typedef struct rl_frame_buffers rl_frame_buffers;
 
-/* Builds the programs of all live nodes, on up to `threads` threads. Keeps pointers to all arguments. `march`: some light
- * may have SHADOW_MARCH; without, its code is left out and such a light has no shadow. */
-rl_code rl_executor_new(rl_device *device, const rl_plan *plan, const rl_materials *materials, bool march, int threads,
-                        const rl_log *log, rl_executor **out, rl_error *err);
+/* Builds the programs of all live nodes, on up to `threads` threads. Keeps pointers to all arguments.
+ * `march`: some light may have SHADOW_MARCH; without, its code is left out and such a light has no shadow. */
+rl_code rl_executor_new(rl_device *device, const rl_plan *plan, const rl_materials *materials, bool march,
+                        int threads, const rl_log *log, rl_executor **out, rl_error *err);
 void rl_executor_free(rl_executor **executor);
 
 /* Allocates slots and history for frames of this size (nothing happens when it is the size already); history
@@ -43,7 +43,7 @@ typedef struct rl_frame_values {
     int number;
     camera_t camera;
     const light_t *lights;
-    int n_lights; /* at most what it was for the first frame, or any number for it */
+    int n_lights;             /* at most what it was for the first frame, or any number for it */
     const ambient_t *ambient; /* NULL = none */
 } rl_frame_values;
 
@@ -57,17 +57,17 @@ void rl_executor_cut(rl_executor *executor);
 
 /* ---- history as bytes: a checkpoint (executor_history.c) ---- */
 
-/* What the next frame would see of the past: the valid half of every pair, one after the other in the order of the
- * plan's buffers. 0 when the plan keeps no history or no frame has run. */
+/* What the next frame would see of the past: the valid half of every pair, one after the other in the order
+ * of the plan's buffers. 0 when the plan keeps no history or no frame has run. */
 size_t rl_executor_history_bytes(const rl_executor *executor);
 bool rl_executor_has_history(const rl_executor *executor);
-/* Copies it out (rl_executor_history_bytes bytes), with the camera of the frame that it is of. RL_E_INTERNAL when
- * there is none. */
+/* Copies it out (rl_executor_history_bytes bytes), with the camera of the frame that it is of. RL_E_INTERNAL
+ * when there is none. */
 rl_code rl_executor_history_save(rl_executor *executor, void *out, camera_t *previous, rl_error *err);
 /* Puts it back, bit for bit, for frames of that size: the next run goes on as if the frame had just run here.
  * RL_E_DATA when `bytes` is not what such history takes. */
-rl_code rl_executor_history_load(rl_executor *executor, const rl_geometry *geometry, const void *in, size_t bytes,
-                                 const camera_t *previous, rl_error *err);
+rl_code rl_executor_history_load(rl_executor *executor, const rl_geometry *geometry, const void *in,
+                                 size_t bytes, const camera_t *previous, rl_error *err);
 
 #ifdef __cplusplus
 }

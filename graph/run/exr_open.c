@@ -122,7 +122,8 @@ static rl_code open_file(rl_exr *file, rl_error *err)
     init.size_fn = query_size;
     rl_exr_core_listen();
     exr_result_t rv = exr_start_read(&file->ctx, file->path, &init);
-    /* The core reads on when there is no memory for an attribute, and takes its default: another display window. */
+    /* The core reads on when there is no memory for an attribute, and takes its default: another display
+     * window. */
     if (!rv && starved)
         rv = EXR_ERR_OUT_OF_MEMORY;
     if (rv)

@@ -37,7 +37,8 @@ static void planar_row(float *row, int width, const rl_layer *layer)
 static double ray_slope(const rl_ingest_depth *how, int x, int y)
 {
     const camera_t *c = how->camera;
-    double px = (double)how->x + x + 0.5 + (double)c->jitter[0], py = (double)how->y + y + 0.5 + (double)c->jitter[1];
+    double px = (double)how->x + x + 0.5 + (double)c->jitter[0],
+           py = (double)how->y + y + 0.5 + (double)c->jitter[1];
     double rx = (px - (double)c->centre[0]) / (double)c->focal[0];
     double ry = (py - (double)c->centre[1]) / (double)c->focal[1];
     return sqrt(1 + rx * rx + ry * ry);
@@ -61,11 +62,14 @@ void rl_ingest_depth_rows(float *plane, rl_rows rows, const rl_ingest_depth *how
     }
 }
 
-/* ---- motion ---------------------------------------------------------------------------------------------- */
+/* ---- motion ----------------------------------------------------------------------------------------------
+ */
 
 void rl_ingest_motion_rows(float *const planes[2], rl_rows rows, const rl_layer *layer, int width, int height)
 {
-    float unit = layer->motion_unit == RL_MOTION_PIXELS ? 0.0f : layer->motion_unit == RL_MOTION_UV ? 1.0f : 0.5f;
+    float unit = layer->motion_unit == RL_MOTION_PIXELS ? 0.0f
+                 : layer->motion_unit == RL_MOTION_UV   ? 1.0f
+                                                        : 0.5f;
     float sx = unit > 0 ? unit * (float)width : 1.0f, sy = unit > 0 ? unit * (float)height : 1.0f;
     if (layer->points_next) {
         sx = -sx;

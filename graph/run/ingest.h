@@ -49,7 +49,8 @@ typedef struct rl_ingest_normal {
 void rl_ingest_normal_rows(float *const planes[3], rl_rows rows, const rl_ingest_normal *how);
 
 /* Vectors to the frame before, in pixels, x right, y down. `width` and `height`: of the display window. */
-void rl_ingest_motion_rows(float *const planes[2], rl_rows rows, const rl_layer *layer, int width, int height);
+void rl_ingest_motion_rows(float *const planes[2], rl_rows rows, const rl_layer *layer, int width,
+                           int height);
 
 /* Ids that no material covers: up to 8 of them, the smallest, with their pixel counts. Zeroed by the caller.
  */

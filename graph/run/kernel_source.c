@@ -100,8 +100,8 @@ static void add_structural(const rl_pass *pass, const void *params, rl_str *out)
     }
 }
 
-rl_code rl_kernel_text(rl_arena *arena, const rl_plan *plan, const rl_plan_node *node, bool march, rl_str *out,
-                       rl_error *err)
+rl_code rl_kernel_text(rl_arena *arena, const rl_plan *plan, const rl_plan_node *node, bool march,
+                       rl_str *out, rl_error *err)
 {
     const rl_graph_node *n = &plan->graph->nodes[node->node];
     const rl_pass *pass = n->pass;

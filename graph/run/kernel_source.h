@@ -16,8 +16,8 @@ const char *rl_kernel_file(rl_arena *arena, const char *name);
 
 /* `march`: a light asks for SHADOW_MARCH (LIGHTS_MARCH in programs of passes with .lights).
  * HAS_x, LAYOUT_x, P_x, params_t, material_t, then the sources, each behind a #line with its name. */
-rl_code rl_kernel_text(rl_arena *arena, const rl_plan *plan, const rl_plan_node *node, bool march, rl_str *out,
-                       rl_error *err);
+rl_code rl_kernel_text(rl_arena *arena, const rl_plan *plan, const rl_plan_node *node, bool march,
+                       rl_str *out, rl_error *err);
 
 /* The program of the conversions between layouts. */
 rl_code rl_kernel_convert_text(rl_arena *arena, rl_str *out, rl_error *err);

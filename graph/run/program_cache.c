@@ -80,10 +80,7 @@ rl_code rl_program_cache_save(const uint64_t key[2], const unsigned char *binary
     char folder[2048], path[2048];
     if (!cache_path(key, folder, path, sizeof path))
         return RL_OK;
-    header h = {
-        .key = {key[0], key[1]},
-          .size = size, .content = XXH3_64bits(binary, size)
-    };
+    header h = {.key = {key[0], key[1]}, .size = size, .content = XXH3_64bits(binary, size)};
     memcpy(h.magic, magic, sizeof magic);
     unsigned char *whole = rl_malloc(sizeof h + size);
     if (!whole)

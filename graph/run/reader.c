@@ -8,7 +8,8 @@
 #include "graph/run/camera.h"
 #include "graph/run/reader_parts.h"
 
-/* ---- frames ---------------------------------------------------------------------------------------------- */
+/* ---- frames ----------------------------------------------------------------------------------------------
+ */
 
 void rl_frame_release(rl_frame *f)
 {
@@ -24,12 +25,14 @@ void rl_frame_free(rl_frame *f)
     *f = (rl_frame){0};
 }
 
-/* ---- making ---------------------------------------------------------------------------------------------- */
+/* ---- making ----------------------------------------------------------------------------------------------
+ */
 
 static rl_code add_binding(rl_reader *r, const rl_layer *layer, int buffer, int plane, int n, rl_error *err)
 {
     if (r->n_bindings == RL_MOST_BINDINGS)
-        return rl_fail(err, RL_E_CONFIG, layer->where, "a capture can have at most %d layers", RL_MOST_BINDINGS);
+        return rl_fail(err, RL_E_CONFIG, layer->where, "a capture can have at most %d layers",
+                       RL_MOST_BINDINGS);
     rl_binding b = {.layer = layer, .buffer = buffer, .plane = plane, .n = n};
     b.is_depth = layer->id == RL_LAYER_DEPTH;
     b.is_stencil = layer->id == RL_LAYER_STENCIL;

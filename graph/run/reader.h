@@ -1,5 +1,5 @@
-/* Reads the frames of one capture into the buffers of a plan: opens files, decodes only what the plan wants, converts it to
- * what relit works with (DESIGN 2) while the rows are in the cache. */
+/* Reads the frames of one capture into the buffers of a plan: opens files, decodes only what the plan wants,
+ * converts it to what relit works with (DESIGN 2) while the rows are in the cache. */
 #ifndef RL_RUN_READER_H
 #define RL_RUN_READER_H
 
@@ -22,18 +22,18 @@ enum { RL_MOST_FILES = 32 }; /* patterns of one capture */
 
 /* A frame in flight. Zeroed at first; freed with rl_frame_free. Reused from frame to frame. */
 typedef struct rl_frame {
-    int number;                /* under which it is processed */
+    int number; /* under which it is processed */
     rl_geometry geometry;
     rl_exr_box data_window, display_window;
     camera_t camera;
-    rl_frame_buffers *buffers; /* of this geometry */
+    rl_frame_buffers *buffers;    /* of this geometry */
     rl_exr *files[RL_MOST_FILES]; /* open until the frame is released, for their attributes */
-    int main_file, main_part;  /* that hold depth: cameras and metadata come from there */
-    uint32_t *ids;             /* the stencil as the file has it, width*height; NULL unless asked for */
+    int main_file, main_part;     /* that hold depth: cameras and metadata come from there */
+    uint32_t *ids;                /* the stencil as the file has it, width*height; NULL unless asked for */
     size_t ids_room;
     uint64_t nonfinite, clamped; /* of the capture */
     uint64_t clipped;            /* of the outputs */
-    rl_error error;            /* of any stage; the first one counts */
+    rl_error error;              /* of any stage; the first one counts */
     double load_s, run_s, write_s;
 } rl_frame;
 
@@ -67,8 +67,8 @@ void rl_reader_free(rl_reader **reader);
 rl_code rl_reader_open(rl_reader *reader, int file_number, rl_frame *frame, rl_error *err);
 
 /* The files that a frame is read from, in the order of the manifest's patterns; paths in the arena. */
-rl_code rl_reader_paths(const rl_reader *reader, int file_number, rl_arena *arena, const char *paths[RL_MOST_FILES],
-                        size_t *n, rl_error *err);
+rl_code rl_reader_paths(const rl_reader *reader, int file_number, rl_arena *arena,
+                        const char *paths[RL_MOST_FILES], size_t *n, rl_error *err);
 
 /* Errors that say that a frame's files are missing or broken, which --on-missing is about. */
 bool rl_reader_missed(rl_code code);

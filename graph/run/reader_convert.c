@@ -28,7 +28,8 @@ static uint64_t clamp_planes(float *const p[3], int n, rl_rows rows, float low, 
 
 static void convert_depth(const rl_frame *f, const rl_layer *layer, float *p, rl_rows rows)
 {
-    rl_ingest_depth how = {.layer = layer, .camera = &f->camera, .x = f->data_window.x0, .y = f->data_window.y0};
+    rl_ingest_depth how = {
+        .layer = layer, .camera = &f->camera, .x = f->data_window.x0, .y = f->data_window.y0};
     rl_ingest_depth_rows(p, rows, &how);
 }
 
@@ -40,7 +41,8 @@ static void convert_normal(const rl_reader *r, const rl_frame *f, const rl_layer
         float v = f->camera.to_world[4 * (i / 3) + i % 3];
         m[i] = i % 3 == 2 && r->setup.manifest->camera.forward_z ? -v : v;
     }
-    rl_ingest_normal how = {.encoding = layer->encoding, .rotate = layer->space == RL_SPACE_CAMERA ? m : NULL};
+    rl_ingest_normal how = {.encoding = layer->encoding,
+                            .rotate = layer->space == RL_SPACE_CAMERA ? m : NULL};
     rl_ingest_normal_rows(p, rows, &how);
 }
 
@@ -48,7 +50,8 @@ static void convert_stencil(const rl_reader *r, rl_frame *f, rl_frame_maps *maps
 {
     rl_unknown_ids unknown = {0};
     for (int y = rows.y0; y < rows.y1 && f->ids; y++)
-        memcpy(f->ids + (size_t)y * (size_t)rows.width, p + (size_t)y * rows.stride, (size_t)rows.width * sizeof *p);
+        memcpy(f->ids + (size_t)y * (size_t)rows.width, p + (size_t)y * rows.stride,
+               (size_t)rows.width * sizeof *p);
     rl_ingest_stencil_rows(p, maps->base[r->depth][0], rows, r->setup.materials, &unknown);
     if (unknown.pixels) {
         pthread_mutex_lock(&maps->mutex);
@@ -70,7 +73,8 @@ void rl_reader_convert(rl_reader *r, rl_frame *f, rl_frame_maps *maps, int bindi
     const rl_binding *b = &r->bindings[binding];
     float *const *p = maps->base[binding];
     rl_rows rows = {.width = f->geometry.width, .y0 = y0, .y1 = y1, .stride = (size_t)f->geometry.stride};
-    int w = f->display_window.x1 - f->display_window.x0 + 1, h = f->display_window.y1 - f->display_window.y0 + 1;
+    int w = f->display_window.x1 - f->display_window.x0 + 1,
+        h = f->display_window.y1 - f->display_window.y0 + 1;
     uint64_t clamped = 0;
     switch (b->layer->id) {
     case RL_LAYER_ALBEDO:
@@ -125,11 +129,13 @@ rl_code rl_reader_check_ids(const rl_reader *r, const rl_frame *f, const rl_fram
         return RL_OK;
     rl_str text = {0};
     for (size_t i = 0; i < u->n; i++)
-        rl_str_printf(&text, "%s%u (%llu pixels)", i ? ", " : "", u->ids[i].id, (unsigned long long)u->ids[i].pixels);
-    rl_code code = rl_fail_file(err, RL_E_DATA, f->files[f->main_file] ? rl_exr_path(f->files[f->main_file]) : "memory",
-                                "frame %d: no material covers stencil id %s; add a material with 'stencil:', or "
-                                "'default: {}' for the rest (known: %zu materials)",
-                                f->number, rl_str_text(&text), r->setup.materials->count - 1);
+        rl_str_printf(&text, "%s%u (%llu pixels)", i ? ", " : "", u->ids[i].id,
+                      (unsigned long long)u->ids[i].pixels);
+    rl_code code =
+        rl_fail_file(err, RL_E_DATA, f->files[f->main_file] ? rl_exr_path(f->files[f->main_file]) : "memory",
+                     "frame %d: no material covers stencil id %s; add a material with 'stencil:', or "
+                     "'default: {}' for the rest (known: %zu materials)",
+                     f->number, rl_str_text(&text), r->setup.materials->count - 1);
     rl_str_free(&text);
     return code;
 }

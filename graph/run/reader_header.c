@@ -13,9 +13,10 @@ static rl_code missing_channel(const rl_layer *layer, const rl_exr *file, const 
             rl_str_printf(&text, " %s%s%s", rl_exr_parts(file) > 1 ? part->name : "",
                           rl_exr_parts(file) > 1 ? ":" : "", part->channels[i].name);
     }
-    rl_code code = rl_fail_file(err, RL_E_FORMAT, rl_exr_path(file),
-                                "layer '%s' needs channel '%s'; the file has:%s (set layers.%s in capture.yaml)",
-                                layer->name, channel, rl_str_text(&text), layer->name);
+    rl_code code =
+        rl_fail_file(err, RL_E_FORMAT, rl_exr_path(file),
+                     "layer '%s' needs channel '%s'; the file has:%s (set layers.%s in capture.yaml)",
+                     layer->name, channel, rl_str_text(&text), layer->name);
     rl_str_free(&text);
     return code;
 }
@@ -25,8 +26,9 @@ rl_code rl_reader_find_part(const rl_layer *layer, const rl_exr *file, int *out,
 {
     int first = layer->part ? rl_exr_part_named(file, layer->part) : 0;
     if (first < 0)
-        return rl_fail_file(err, RL_E_FORMAT, rl_exr_path(file), "layer '%s' needs part '%s', which the file does not have",
-                            layer->name, layer->part);
+        return rl_fail_file(err, RL_E_FORMAT, rl_exr_path(file),
+                            "layer '%s' needs part '%s', which the file does not have", layer->name,
+                            layer->part);
     const char *missing = layer->channels[0];
     for (int p = first; p < (layer->part ? first + 1 : rl_exr_parts(file)); p++) {
         int have = 0;
@@ -42,7 +44,8 @@ rl_code rl_reader_find_part(const rl_layer *layer, const rl_exr *file, int *out,
     return missing_channel(layer, file, missing, err);
 }
 
-/* ---- headers --------------------------------------------------------------------------------------------- */
+/* ---- headers ---------------------------------------------------------------------------------------------
+ */
 
 static bool number_attr(const rl_exr *file, int part, const char *name, int n, double *out)
 {
@@ -67,10 +70,14 @@ static void read_lens(rl_reader *r, const rl_frame *f, int file_number, rl_camer
         c->fov_x = *fov;
     } else if (!number_attr(file, f->main_part, "camera:fovx", 1, &c->fov_x) && !r->said_window) {
         r->said_window = true;
-        rl_report(r->setup.log, c->screen_width == 1 ? RL_WARNING : RL_VERBOSE, (rl_where){.file = rl_exr_path(file)},
-                  "no attribute camera:fovx: the field of view is taken from screenWindowWidth %g%s", c->screen_width,
-                  c->screen_width == 1 ? ", which writers leave at 1 when they do not know it (set camera.fov_x in the manifest)"
-                                       : "");
+        rl_report(
+            r->setup.log, c->screen_width == 1 ? RL_WARNING : RL_VERBOSE,
+            (rl_where){.file = rl_exr_path(file)},
+            "no attribute camera:fovx: the field of view is taken from screenWindowWidth %g%s",
+            c->screen_width,
+            c->screen_width == 1
+                ? ", which writers leave at 1 when they do not know it (set camera.fov_x in the manifest)"
+                : "");
     }
     if (jitter) {
         memcpy(c->jitter, jitter, sizeof c->jitter);
@@ -99,8 +106,9 @@ static rl_code read_camera(rl_reader *r, rl_frame *f, int file_number, rl_error 
         code = rl_camera_make(&c, &f->camera, &inner);
     }
     if (code)
-        return rl_fail(err, code, (rl_where){inner.file[0] ? inner.file : rl_exr_path(file), inner.line, inner.column}, "%s",
-                       inner.text);
+        return rl_fail(err, code,
+                       (rl_where){inner.file[0] ? inner.file : rl_exr_path(file), inner.line, inner.column},
+                       "%s", inner.text);
     return RL_OK;
 }
 
@@ -122,10 +130,11 @@ static rl_code check_layers(rl_reader *r, rl_frame *f, rl_error *err)
             return code;
         rl_exr_box w = rl_exr_part_at(file, part)->data_window;
         if (!same_box(w, window))
-            return rl_fail_file(err, RL_E_FORMAT, rl_exr_path(file),
-                                "layer '%s' has the data window (%d, %d) - (%d, %d), layer 'depth' (%d, %d) - (%d, %d): all "
-                                "layers of a frame must have one size",
-                                layer->name, w.x0, w.y0, w.x1, w.y1, window.x0, window.y0, window.x1, window.y1);
+            return rl_fail_file(
+                err, RL_E_FORMAT, rl_exr_path(file),
+                "layer '%s' has the data window (%d, %d) - (%d, %d), layer 'depth' (%d, %d) - (%d, %d): all "
+                "layers of a frame must have one size",
+                layer->name, w.x0, w.y0, w.x1, w.y1, window.x0, window.y0, window.x1, window.y1);
     }
     return RL_OK;
 }
@@ -137,10 +146,12 @@ static rl_code open_files(rl_reader *r, int file_number, rl_frame *f, rl_error *
     for (int i = 0; i < r->n_bindings && !code; i++) {
         const rl_layer *layer = r->bindings[i].layer;
         if (layer->pattern >= RL_MOST_FILES)
-            code = rl_fail(err, RL_E_CONFIG, layer->where, "a capture can have at most %d files a frame", RL_MOST_FILES);
+            code = rl_fail(err, RL_E_CONFIG, layer->where, "a capture can have at most %d files a frame",
+                           RL_MOST_FILES);
         else if (!f->files[layer->pattern]) {
             const char *path = rl_manifest_path(&arena, r->setup.manifest, layer, file_number);
-            code = path ? rl_exr_open(path, r->setup.limit, &f->files[layer->pattern], err) : rl_fail_memory(err, 1);
+            code = path ? rl_exr_open(path, r->setup.limit, &f->files[layer->pattern], err)
+                        : rl_fail_memory(err, 1);
         }
     }
     rl_arena_free(&arena);
@@ -166,7 +177,8 @@ rl_code rl_reader_open(rl_reader *r, int file_number, rl_frame *f, rl_error *err
     f->display_window = part->display_window;
     code = check_layers(r, f, err);
     if (!code)
-        code = rl_geometry_make(f->data_window.x0, f->data_window.y0, part->width, part->height, &f->geometry, err);
+        code = rl_geometry_make(f->data_window.x0, f->data_window.y0, part->width, part->height, &f->geometry,
+                                err);
     if (!code)
         code = read_camera(r, f, file_number, err);
     return code;

@@ -12,9 +12,10 @@ rl_code rl_reader_memory(rl_reader *r, const rl_frame_data *d, rl_frame *f, rl_e
     if (code)
         return code;
     f->data_window = (rl_exr_box){d->x, d->y, d->x + d->width - 1, d->y + d->height - 1};
-    f->display_window = d->display[2] > 0 ? (rl_exr_box){d->display[0], d->display[1], d->display[0] + d->display[2] - 1,
-                                                         d->display[1] + d->display[3] - 1}
-                                          : f->data_window;
+    f->display_window = d->display[2] > 0
+                            ? (rl_exr_box){d->display[0], d->display[1], d->display[0] + d->display[2] - 1,
+                                           d->display[1] + d->display[3] - 1}
+                            : f->data_window;
     float header[16];
     for (int i = 0; i < 16; i++) /* as a file would have it: for row vectors */
         header[i] = (float)d->world_to_camera[4 * (i % 4) + i / 4];
@@ -56,27 +57,29 @@ static void copy_channel(const rl_channel_data *c, rl_frame *f, float *to, bool 
     }
 }
 
-static rl_code copy_layer(const rl_reader *r, int binding, const rl_frame_data *d, rl_frame *f, rl_frame_maps *maps,
-                          rl_error *err)
+static rl_code copy_layer(const rl_reader *r, int binding, const rl_frame_data *d, rl_frame *f,
+                          rl_frame_maps *maps, rl_error *err)
 {
     const rl_binding *b = &r->bindings[binding];
     for (int k = 0; k < b->layer->n_channels; k++) {
         const rl_channel_data *c = find_channel(d, b->layer->channels[k]);
         if (!c || (b->is_stencil ? !c->ids : !c->floats))
-            return rl_fail(err, RL_E_DATA, RL_NOWHERE, "layer '%s' needs channel '%s' as %s, which the frame in memory does not have",
+            return rl_fail(err, RL_E_DATA, RL_NOWHERE,
+                           "layer '%s' needs channel '%s' as %s, which the frame in memory does not have",
                            b->layer->name, b->layer->channels[k], b->is_stencil ? "ids" : "floats");
         if (!b->is_stencil) {
             copy_channel(c, f, maps->base[binding][k], b->is_depth);
             continue;
         }
         for (int y = 0; y < f->geometry.height; y++)
-            memcpy(maps->base[binding][k] + (size_t)y * (size_t)f->geometry.stride, c->ids + (size_t)y * c->stride,
-                   (size_t)f->geometry.width * sizeof *c->ids);
+            memcpy(maps->base[binding][k] + (size_t)y * (size_t)f->geometry.stride,
+                   c->ids + (size_t)y * c->stride, (size_t)f->geometry.width * sizeof *c->ids);
     }
     return RL_OK;
 }
 
-rl_code rl_reader_memory_pixels(rl_reader *r, const rl_frame_data *d, rl_frame *f, rl_pool *pool, rl_error *err)
+rl_code rl_reader_memory_pixels(rl_reader *r, const rl_frame_data *d, rl_frame *f, rl_pool *pool,
+                                rl_error *err)
 {
     rl_frame_maps maps = {0};
     pthread_mutex_init(&maps.mutex, NULL);

@@ -12,9 +12,9 @@ enum { RL_MOST_BINDINGS = 96 };
 /* A layer of the manifest and the planes that it fills. */
 typedef struct rl_binding {
     const rl_layer *layer;
-    int buffer;      /* of the plan */
-    int plane;       /* its first plane there */
-    int n;           /* planes that it fills */
+    int buffer; /* of the plan */
+    int plane;  /* its first plane there */
+    int n;      /* planes that it fills */
     bool is_stencil, is_depth;
     rl_ocio_transform *to_working; /* colours in another space; NULL: none needed */
 } rl_binding;
@@ -45,8 +45,9 @@ rl_code rl_reader_check_ids(const rl_reader *r, const rl_frame *f, const rl_fram
 /* reader_header.c: the part of the file that holds all channels of a layer. */
 rl_code rl_reader_find_part(const rl_layer *layer, const rl_exr *file, int *out, rl_error *err);
 
-/* reader_pixels.c: what reading from files and from memory share. Map the planes, and make room for the file's ids; convert all
- * rows of a layer; unmap and give the frame's verdict (`code` is what happened before). */
+/* reader_pixels.c: what reading from files and from memory share. Map the planes, and make room for the
+ * file's ids; convert all rows of a layer; unmap and give the frame's verdict (`code` is what happened
+ * before). */
 rl_code rl_reader_map(rl_reader *r, rl_frame *f, rl_frame_maps *maps, rl_error *err);
 rl_code rl_reader_prepare_ids(rl_reader *r, rl_frame *f, rl_error *err);
 void rl_reader_convert_all(rl_reader *r, rl_frame *f, rl_frame_maps *maps, int binding, rl_pool *pool);

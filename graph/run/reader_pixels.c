@@ -15,7 +15,8 @@ rl_code rl_reader_map(rl_reader *r, rl_frame *f, rl_frame_maps *maps, rl_error *
         if (code)
             return code;
         for (int k = 0; k < 3; k++)
-            maps->base[i][k] = k < b->n ? (float *)p + first + (size_t)(b->plane + k) * (size_t)g->plane : NULL;
+            maps->base[i][k] =
+                k < b->n ? (float *)p + first + (size_t)(b->plane + k) * (size_t)g->plane : NULL;
     }
     return RL_OK;
 }
@@ -26,7 +27,8 @@ static rl_code unmap_planes(rl_reader *r, rl_frame *f, const rl_frame_maps *maps
     for (int i = 0; i < r->n_bindings; i++) {
         if (!maps->base[i][0])
             continue;
-        rl_code one = rl_memory_unmap(rl_frame_buffers_memory(f->buffers, r->bindings[i].buffer), code ? NULL : err);
+        rl_code one =
+            rl_memory_unmap(rl_frame_buffers_memory(f->buffers, r->bindings[i].buffer), code ? NULL : err);
         code = code ? code : one;
     }
     return code;

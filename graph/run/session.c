@@ -36,7 +36,9 @@ static rl_code read_pipeline(rl_session *s, rl_error *err)
         code = rl_fail(err, RL_E_USAGE, RL_NOWHERE, "no pipeline was given");
     if (!code)
         code = apply_settings(s, &root, err);
-    return code ? code : rl_pipeline_parse(&s->arena, o->pipeline ? o->pipeline : "pipeline", root, s->log, &s->pipeline, err);
+    return code ? code
+                : rl_pipeline_parse(&s->arena, o->pipeline ? o->pipeline : "pipeline", root, s->log,
+                                    &s->pipeline, err);
 }
 
 rl_code rl_session_open(const rl_options *options, rl_session **out, rl_error *err)
@@ -90,11 +92,12 @@ void rl_session_close(rl_session **session)
 
 rl_code rl_session_prepare(rl_session *s, rl_error *err)
 {
-    rl_code code = s->device ? RL_OK : rl_device_open(s->options.device, s->options.threads, s->log, &s->device, err);
+    rl_code code =
+        s->device ? RL_OK : rl_device_open(s->options.device, s->options.threads, s->log, &s->device, err);
     for (size_t i = 0; i < s->n_sequences && !code; i++)
         if (!s->sequences[i].executor)
-            code = rl_executor_new(s->device, s->sequences[i].plan, s->sequences[i].materials, s->sequences[i].march,
-                                   s->threads, s->log, &s->sequences[i].executor, err);
+            code = rl_executor_new(s->device, s->sequences[i].plan, s->sequences[i].materials,
+                                   s->sequences[i].march, s->threads, s->log, &s->sequences[i].executor, err);
     return code;
 }
 
@@ -118,7 +121,8 @@ long long rl_session_frame(const rl_session *s, size_t capture, size_t i)
     return i < rl_session_frames(s, capture) ? s->sequences[capture].frames.numbers[i] : 0;
 }
 
-rl_code rl_session_plan(const rl_session *s, size_t capture, rl_plan_format format, char **text, rl_error *err)
+rl_code rl_session_plan(const rl_session *s, size_t capture, rl_plan_format format, char **text,
+                        rl_error *err)
 {
     *text = NULL;
     if (capture >= s->n_sequences)

@@ -23,7 +23,8 @@ typedef struct rl_active_light {
     const rl_light_spec *spec;
     const rl_layer *shadow, *thickness; /* the capture's layers for it, or NULL */
     int shadow_plane, thickness_plane;  /* of the ports, or -1 */
-    float to_working[9];                /* from the colour space of its amounts, rows listed; its temperature's colour is in it */
+    float to_working[9]; /* from the colour space of its amounts, rows listed; its temperature's colour is in
+                            it */
 } rl_active_light;
 
 /* One capture with all that depends on it. Constant after rl_session_open, except for the executor. */
@@ -32,14 +33,14 @@ typedef struct rl_sequence {
     rl_frames frames; /* to be processed, in order */
     rl_active_light *lights;
     size_t n_lights;
-    bool march; /* one of them has `shadow: screen` */
+    bool march;            /* one of them has `shadow: screen` */
     light_t *light_values; /* of the frame that runs */
     rl_light_planes shadow, thickness;
     const rl_materials *materials;
     const rl_node *nodes; /* the pipeline's, with this capture's sets of materials */
     const rl_graph *graph;
     const rl_plan *plan;
-    rl_geometry geometry; /* of the first frame */
+    rl_geometry geometry;  /* of the first frame */
     uint64_t decode_bytes; /* that reading it takes besides its buffers */
     rl_reader *reader;
     rl_executor *executor; /* NULL until prepared */
@@ -91,30 +92,32 @@ void rl_sequence_close(rl_sequence *sequence);
 /* session_paths.c: no two outputs, captures or frames write one file. */
 rl_code rl_session_paths(rl_session *session, rl_error *err);
 
-/* session_run.c (batches of frames: session_batch.c): runs the kernels on a loaded frame, and decides whether history reaches
- * it. `spans`: NULL, or plan->n_steps of them. */
+/* session_run.c (batches of frames: session_batch.c): runs the kernels on a loaded frame, and decides whether
+ * history reaches it. `spans`: NULL, or plan->n_steps of them. */
 rl_code rl_session_execute(rl_session *session, rl_sequence *sequence, rl_frame *frame, rl_span *spans,
                            rl_error *err);
 /* Buffers follow the size of the frame that they hold. */
 rl_code rl_session_fit_buffers(rl_sequence *sequence, rl_frame *frame, rl_error *err);
-/* Writes all outputs of a frame that ran; files[0…n_outputs-1] (may be NULL: memory was out) get the names of those that
- * are whole. */
-rl_code rl_session_write_frame(rl_session *session, rl_sequence *sequence, rl_frame *frame, const rl_run_hooks *hooks,
-                               rl_arena *arena, const char **files, size_t *n_files, rl_error *err);
+/* Writes all outputs of a frame that ran; files[0…n_outputs-1] (may be NULL: memory was out) get the names of
+ * those that are whole. */
+rl_code rl_session_write_frame(rl_session *session, rl_sequence *sequence, rl_frame *frame,
+                               const rl_run_hooks *hooks, rl_arena *arena, const char **files,
+                               size_t *n_files, rl_error *err);
 /* Where the planes of a graph output's image are, mapped; unmap with the memory. */
-rl_code rl_session_map_image(const rl_sequence *sequence, const rl_frame *frame, int buffer, rl_sink_image *out,
-                             rl_memory **memory, rl_error *err);
+rl_code rl_session_map_image(const rl_sequence *sequence, const rl_frame *frame, int buffer,
+                             rl_sink_image *out, rl_memory **memory, rl_error *err);
 
 /* session_shard.c: checks the options of shards and counts frames. */
 rl_code rl_session_count(rl_session *session, rl_error *err);
 
-/* session_memory.c: bytes that a run of a sequence allocates at most with so many frames in flight, saturating: the
- * plan's buffers, and what reading, writing and checkpoints take besides. 0 when the size is not known (frames in
- * memory). */
+/* session_memory.c: bytes that a run of a sequence allocates at most with so many frames in flight,
+ * saturating: the plan's buffers, and what reading, writing and checkpoints take besides. 0 when the size is
+ * not known (frames in memory). */
 typedef struct rl_memory_need {
     size_t plan, decode, encode, checkpoint, total;
 } rl_memory_need;
-void rl_session_need(const rl_session *session, const rl_sequence *sequence, int in_flight, rl_memory_need *out);
+void rl_session_need(const rl_session *session, const rl_sequence *sequence, int in_flight,
+                     rl_memory_need *out);
 /* As many frames as overlap usefully and as the memory limit lets be in flight. */
 enum { RL_MOST_IN_FLIGHT = 3 }; /* one is read, one runs, one is written */
 int rl_session_in_flight(const rl_session *session, const rl_sequence *sequence);

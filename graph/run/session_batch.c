@@ -98,7 +98,8 @@ static void batch_run(void *ctx, size_t item, int slot)
     rl_session_stage(b->hooks, RL_LANE_RUN, f);
     rl_sequence *q = b->q;
     rl_state_ready(&b->state, work, slot, &restored, &q->last_number, &q->last_camera, &f->error);
-    q->has_last = !f->error.code && !b->held[slot] && (restored || (q->has_last && work->start == RL_START_ON));
+    q->has_last =
+        !f->error.code && !b->held[slot] && (restored || (q->has_last && work->start == RL_START_ON));
     if (!f->error.code)
         rl_session_execute(b->s, q, f, b->spans, &f->error);
     if (!f->error.code)

@@ -10,7 +10,8 @@
 #include "graph/run/data_files.h"
 #include "graph/run/session.h"
 
-/* ---- the manifest ---------------------------------------------------------------------------------------- */
+/* ---- the manifest ----------------------------------------------------------------------------------------
+ */
 
 static bool is_yaml(const char *path)
 {
@@ -36,7 +37,8 @@ static rl_code list_channels(rl_arena *arena, const rl_exr *file, rl_channel **o
 }
 
 /* The preset that fits the first file of a bare pattern. */
-static rl_code find_preset(rl_session *s, const char *files, const char *presets, const char **out, rl_error *err)
+static rl_code find_preset(rl_session *s, const char *files, const char *presets, const char **out,
+                           rl_error *err)
 {
     rl_manifest *m = NULL;
     rl_exr *file = NULL;
@@ -54,7 +56,8 @@ static rl_code find_preset(rl_session *s, const char *files, const char *presets
         code = rl_preset_find(&s->arena, presets, channels, n, &match, err);
     if (!code && (!match.name || match.missing_required > 0))
         code = rl_fail_file(err, RL_E_CONFIG, path,
-                            "no known preset fits the channels of this file%s%s%s%s; write a capture.yaml (`relit inspect %s` "
+                            "no known preset fits the channels of this file%s%s%s%s; write a capture.yaml "
+                            "(`relit inspect %s` "
                             "prints a start)",
                             match.name ? " (the nearest, '" : "", match.name ? match.name : "",
                             match.name ? "', misses " : "", match.name ? match.missing : "", files);
@@ -127,7 +130,8 @@ static rl_code choose_frames(rl_session *s, rl_sequence *q, rl_error *err)
     return code ? code : rl_frames_check(&q->manifest->frames, &q->frames, where, err);
 }
 
-/* ---- materials and graph --------------------------------------------------------------------------------- */
+/* ---- materials and graph ---------------------------------------------------------------------------------
+ */
 
 static rl_code make_materials(rl_session *s, rl_sequence *q, rl_error *err)
 {
@@ -141,14 +145,15 @@ static rl_code make_materials(rl_session *s, rl_sequence *q, rl_error *err)
         names[i] = (rl_stencil_name){.id = m->stencil_names[i].id, .name = m->stencil_names[i].name};
     for (size_t i = 0; i < p->n_nodes; i++)
         used[i] = p->nodes[i].pass;
-    rl_code code = rl_materials_resolve(&s->arena, p->profiles, p->shading, p->materials, names, m->n_stencil_names,
-                                        used, p->n_nodes, s->log, &q->materials, err);
+    rl_code code = rl_materials_resolve(&s->arena, p->profiles, p->shading, p->materials, names,
+                                        m->n_stencil_names, used, p->n_nodes, s->log, &q->materials, err);
     return code ? code
-                : rl_material_sets_fill(&s->arena, p->nodes, p->n_nodes, q->materials, names, m->n_stencil_names,
-                                        &q->nodes, err);
+                : rl_material_sets_fill(&s->arena, p->nodes, p->n_nodes, q->materials, names,
+                                        m->n_stencil_names, &q->nodes, err);
 }
 
-/* The layers that the graph can bind: single ones, each light's, and the planes of the active lights together. */
+/* The layers that the graph can bind: single ones, each light's, and the planes of the active lights
+ * together. */
 static rl_code list_layers(rl_session *s, const rl_sequence *q, rl_layer_info **out, size_t *n, rl_error *err)
 {
     const rl_manifest *m = q->manifest;
@@ -178,8 +183,8 @@ static void note_absent(const rl_session *s, const rl_sequence *q)
         for (size_t p = 0; p < node->pass->ports.n; p++) {
             const rl_port *port = &node->pass->ports.rows[p];
             if (port->if_absent && node->images[p] < 0)
-                rl_report(s->log, RL_NOTE, node->where, "pass '%s' (%s): capture '%s' has no layer '%s': %s", node->name,
-                          node->pass->name, q->manifest->name, port->name, port->if_absent);
+                rl_report(s->log, RL_NOTE, node->where, "pass '%s' (%s): capture '%s' has no layer '%s': %s",
+                          node->name, node->pass->name, q->manifest->name, port->name, port->if_absent);
         }
     }
 }
@@ -194,8 +199,8 @@ static rl_code check_formats(const rl_session *s, const rl_graph *graph, rl_erro
         if (strcasecmp(rl_path_extension(o->file), ".exr") && (image->format == RL_ID || many))
             return rl_fail(err, RL_E_CONFIG, o->file_where,
                            "output '%s': a %s file cannot hold '%s' (%s, %d plane%s); write .exr", o->name,
-                           rl_path_extension(o->file), image->name, rl_format_name(image->format), image->planes,
-                           image->planes == 1 ? "" : "s");
+                           rl_path_extension(o->file), image->name, rl_format_name(image->format),
+                           image->planes, image->planes == 1 ? "" : "s");
     }
     return RL_OK;
 }

@@ -1,4 +1,5 @@
-/* Colour of a session: the OCIO configuration, the working space, and a pass for each output that needs one. */
+/* Colour of a session: the OCIO configuration, the working space, and a pass for each output that needs one.
+ */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -9,19 +10,20 @@
 static rl_code open_config(rl_session *s, rl_error *err)
 {
     const char *env = getenv("OCIO");
-    const char *path = s->options.ocio                       ? s->options.ocio
+    const char *path = s->options.ocio                           ? s->options.ocio
                        : s->pipeline && s->pipeline->ocio_config ? s->pipeline->ocio_config
-                       : env && *env                         ? env
-                                                             : rl_data_path(&s->arena, "color/relit.ocio");
+                       : env && *env                             ? env
+                                     : rl_data_path(&s->arena, "color/relit.ocio");
     if (!path)
-        return rl_fail(err, RL_E_COLOR, RL_NOWHERE,
-                       "relit's own colour config color/relit.ocio is not found; give --ocio FILE or set $RELIT_DATA to "
-                       "the folder that holds it");
+        return rl_fail(
+            err, RL_E_COLOR, RL_NOWHERE,
+            "relit's own colour config color/relit.ocio is not found; give --ocio FILE or set $RELIT_DATA to "
+            "the folder that holds it");
     return rl_ocio_open(path, &s->ocio, err);
 }
 
-/* Only rgb images are colours; the graph knows formats later, so a converting output must name images that turn out to be
- * rgb: the graph's format check says so. */
+/* Only rgb images are colours; the graph knows formats later, so a converting output must name images that
+ * turn out to be rgb: the graph's format check says so. */
 static rl_code make_output(rl_session *s, const rl_output *spec, rl_sink_output *out, rl_wanted *wanted,
                            rl_error *err)
 {
@@ -56,7 +58,8 @@ static rl_code make_output(rl_session *s, const rl_output *spec, rl_sink_output 
     bool converts =
         !code && (spec->display || spec->look || exposed || (spec->colorspace && strcmp(target, s->working)));
     if (converts)
-        code = rl_color_pass_new(s->ocio, &request, exposed, spec->color_where, &s->arena, s->log, &pass, err);
+        code =
+            rl_color_pass_new(s->ocio, &request, exposed, spec->color_where, &s->arena, s->log, &pass, err);
     if (code)
         return code;
     const rl_pass **convert = rl_arena_array(&s->arena, spec->n_layers, sizeof *convert);
@@ -78,9 +81,10 @@ static rl_code make_output(rl_session *s, const rl_output *spec, rl_sink_output 
     return RL_OK;
 }
 
-/* The linear-light tone scale between lights given in lin_rec709 and the working space is a 3x3 matrix; OCIO gives its
- * columns as the images of the unit colours. */
-rl_code rl_session_light_matrix(const rl_session *s, const char *space, rl_where where, float m[9], rl_error *err)
+/* The linear-light tone scale between lights given in lin_rec709 and the working space is a 3x3 matrix; OCIO
+ * gives its columns as the images of the unit colours. */
+rl_code rl_session_light_matrix(const rl_session *s, const char *space, rl_where where, float m[9],
+                                rl_error *err)
 {
     const char *from;
     rl_code code = rl_color_space(s->ocio, space, where, &from, err);
@@ -156,10 +160,12 @@ static const rl_output *dump_spec(rl_session *s, const char *image)
 /* Depth and stencil are read for every frame: emptiness, coverage and unknown ids are told from them. */
 static void add_required(rl_wanted *wanted)
 {
-    static const rl_output_layer layers[] = {{"depth", "capture.depth", {0}}, {"stencil", "capture.stencil", {0}}};
+    static const rl_output_layer layers[] = {{"depth", "capture.depth", {0}},
+                                             {"stencil", "capture.stencil", {0}}};
     static const rl_pass *const convert[2];
     static const void *const params[2];
-    *wanted = (rl_wanted){.name = "required", .layers = layers, .convert = convert, .convert_params = params, .n_layers = 2};
+    *wanted = (rl_wanted){
+        .name = "required", .layers = layers, .convert = convert, .convert_params = params, .n_layers = 2};
 }
 
 rl_code rl_session_colors(rl_session *s, rl_error *err)

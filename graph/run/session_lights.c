@@ -1,4 +1,5 @@
-/* Lights of a session: which are active, which planes of the shadow layers they use, and what the kernels see of them. */
+/* Lights of a session: which are active, which planes of the shadow layers they use, and what the kernels see
+ * of them. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -27,10 +28,11 @@ static void warn_stale(const rl_session *s, const rl_manifest *m, const rl_light
         d2 += d * d;
     }
     if (sqrt(d2) > 1e-3)
-        rl_report(s->log, RL_WARNING, light->where,
-                  "light '%s' stands %.3g m from where the layer 'shadow.%s' was recorded: its shadow is stale "
-                  "(shadow: none switches it off)",
-                  light->name, sqrt(d2), light->shadow_layer);
+        rl_report(
+            s->log, RL_WARNING, light->where,
+            "light '%s' stands %.3g m from where the layer 'shadow.%s' was recorded: its shadow is stale "
+            "(shadow: none switches it off)",
+            light->name, sqrt(d2), light->shadow_layer);
 }
 
 static const rl_layer *light_layer(const rl_manifest *m, const char *kind, const char *light)
@@ -49,8 +51,9 @@ static rl_code no_such_shadow(const rl_manifest *m, const rl_light_spec *light, 
         if (m->layers[i].id == RL_LAYER_SHADOW)
             names[n++] = m->layers[i].light;
     rl_suggest(&text, light->shadow_layer, names, n, "known");
-    rl_code code = rl_fail(err, RL_E_CONFIG, light->where, "light '%s': the capture '%s' has no layer 'shadow.%s'%s",
-                           light->name, m->name, light->shadow_layer, rl_str_text(&text));
+    rl_code code =
+        rl_fail(err, RL_E_CONFIG, light->where, "light '%s': the capture '%s' has no layer 'shadow.%s'%s",
+                light->name, m->name, light->shadow_layer, rl_str_text(&text));
     rl_str_free(&text);
     return code;
 }
@@ -69,8 +72,8 @@ static rl_code bind_shadow(const rl_session *s, const rl_manifest *m, rl_active_
     return RL_OK;
 }
 
-/* The matrix of the light's colour space, with the colour of its temperature in it: factors for the channels of that
- * space, which the working space tells from linear Rec.709. */
+/* The matrix of the light's colour space, with the colour of its temperature in it: factors for the channels
+ * of that space, which the working space tells from linear Rec.709. */
 static rl_code light_color(const rl_session *s, const rl_light_spec *spec, float m[9], rl_error *err)
 {
     rl_code code = rl_session_light_matrix(s, spec->colorspace, spec->where, m, err);
@@ -85,7 +88,8 @@ static rl_code light_color(const rl_session *s, const rl_light_spec *spec, float
         to_working[i] = (double)rec709[i];
     if (!rl_invert3(to_working, from_working))
         return rl_fail(err, RL_E_CONFIG, spec->where,
-                       "light '%s' has a temperature, whose colour the working space cannot tell apart", spec->name);
+                       "light '%s' has a temperature, whose colour the working space cannot tell apart",
+                       spec->name);
     for (int i = 0; i < 9; i++)
         for (int k = 0; k < 3; k++)
             to_rec709[i] += from_working[i / 3 * 3 + k] * (double)m[3 * k + i % 3];

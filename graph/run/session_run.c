@@ -15,7 +15,8 @@ rl_code rl_session_fit_buffers(rl_sequence *q, rl_frame *f, rl_error *err)
     return rl_frame_buffers_new(q->executor, &f->geometry, &f->buffers, err);
 }
 
-/* History ends where the manifest says, at a gap of the numbers, after a frame that failed, at a jump of the camera. */
+/* History ends where the manifest says, at a gap of the numbers, after a frame that failed, at a jump of the
+ * camera. */
 static bool is_cut(const rl_sequence *q, const rl_frame *f)
 {
     const rl_manifest *m = q->manifest;
@@ -26,8 +27,7 @@ static bool is_cut(const rl_sequence *q, const rl_frame *f)
     return gap || rl_camera_jumped(&q->last_camera, &f->camera, 10);
 }
 
-rl_code rl_session_execute(rl_session *s, rl_sequence *q, rl_frame *f, rl_span *spans,
-                           rl_error *err)
+rl_code rl_session_execute(rl_session *s, rl_sequence *q, rl_frame *f, rl_span *spans, rl_error *err)
 {
     rl_code code = rl_executor_resize(q->executor, &f->geometry, err);
     if (code)
@@ -35,12 +35,11 @@ rl_code rl_session_execute(rl_session *s, rl_sequence *q, rl_frame *f, rl_span *
     if (is_cut(q, f))
         rl_executor_cut(q->executor);
     rl_session_light_values(q, &f->camera, q->light_values);
-    rl_frame_values values = {
-        .number = f->number,
-        .camera = f->camera,
-        .lights = q->light_values,
-        .n_lights = (int)q->n_lights,
-        .ambient = &s->ambient};
+    rl_frame_values values = {.number = f->number,
+                              .camera = f->camera,
+                              .lights = q->light_values,
+                              .n_lights = (int)q->n_lights,
+                              .ambient = &s->ambient};
     code = rl_executor_run(q->executor, f->buffers, &values, spans, err);
     q->has_last = !code;
     q->last_number = f->number;
@@ -166,7 +165,8 @@ rl_code rl_session_process(rl_session *s, size_t capture, long long number, cons
     if (capture >= s->n_sequences)
         return rl_fail(err, RL_E_USAGE, RL_NOWHERE, "there is no capture %zu", capture);
     if (number < INT_MIN || number > INT_MAX)
-        return rl_fail(err, RL_E_USAGE, RL_NOWHERE, "frame %lld is not within %d … %d", number, INT_MIN, INT_MAX);
+        return rl_fail(err, RL_E_USAGE, RL_NOWHERE, "frame %lld is not within %d … %d", number, INT_MIN,
+                       INT_MAX);
     rl_sequence *q = &s->sequences[capture];
     rl_code code = rl_session_prepare(s, err);
     if (code)

@@ -27,8 +27,8 @@ void rl_ocio_free(rl_ocio **ocio);
  * not ask, so that a config with one broken view can still be used for the others. */
 rl_code rl_ocio_validate(const rl_ocio *ocio, rl_error *err);
 
-/* Changes when the configuration or a file that it refers to does. Written to out, at most `size` bytes; "" when
- * OpenColorIO cannot say. */
+/* Changes when the configuration or a file that it refers to does. Written to out, at most `size` bytes; ""
+ * when OpenColorIO cannot say. */
 void rl_ocio_fingerprint(const rl_ocio *ocio, char *out, size_t size);
 
 /* ---- names ------------------------------------------------------------------------------------------- */

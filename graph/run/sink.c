@@ -12,13 +12,33 @@
 #include "graph/run/sink_image.h"
 
 /* What of the source's header stays true of the result: cameras, time, what a studio put there. */
-static const char *const kept_attributes[] = {"camera:*",        "worldToCamera", "worldToNDC",  "timeCode",
-                                              "framesPerSecond", "capDate",       "utcOffset",   "longitude",
-                                              "latitude",        "altitude",      "focus",       "expTime",
-                                              "aperture",        "isoSpeed",      "owner",       "comments",
-                                              "reelName",        "imageCounter",  "cameraMake",  "cameraModel",
-                                              "cameraSerialNumber", "lensMake",   "lensModel",   "originalDataWindow",
-                                              "nominalFocalLength", "pinholeFocalLength", "effectiveFocalLength"};
+static const char *const kept_attributes[] = {"camera:*",
+                                              "worldToCamera",
+                                              "worldToNDC",
+                                              "timeCode",
+                                              "framesPerSecond",
+                                              "capDate",
+                                              "utcOffset",
+                                              "longitude",
+                                              "latitude",
+                                              "altitude",
+                                              "focus",
+                                              "expTime",
+                                              "aperture",
+                                              "isoSpeed",
+                                              "owner",
+                                              "comments",
+                                              "reelName",
+                                              "imageCounter",
+                                              "cameraMake",
+                                              "cameraModel",
+                                              "cameraSerialNumber",
+                                              "lensMake",
+                                              "lensModel",
+                                              "originalDataWindow",
+                                              "nominalFocalLength",
+                                              "pinholeFocalLength",
+                                              "effectiveFocalLength"};
 
 /* The part of the data window that is written, relative to it. */
 typedef struct region {
@@ -37,10 +57,14 @@ static rl_code crop_region(const rl_sink_frame *f, region *r, rl_error *err)
         w.y1 = c[1] + c[3] - 1 < d.y1 ? c[1] + c[3] - 1 : d.y1;
         if (w.x1 < w.x0 || w.y1 < w.y0)
             return rl_fail(err, RL_E_DATA, RL_NOWHERE,
-                           "--crop %d,%d,%d,%d lies outside of the data window (%d, %d) - (%d, %d)", c[0], c[1], c[2],
-                           c[3], d.x0, d.y0, d.x1, d.y1);
+                           "--crop %d,%d,%d,%d lies outside of the data window (%d, %d) - (%d, %d)", c[0],
+                           c[1], c[2], c[3], d.x0, d.y0, d.x1, d.y1);
     }
-    *r = (region){.x0 = w.x0 - d.x0, .y0 = w.y0 - d.y0, .width = w.x1 - w.x0 + 1, .height = w.y1 - w.y0 + 1, .window = w};
+    *r = (region){.x0 = w.x0 - d.x0,
+                  .y0 = w.y0 - d.y0,
+                  .width = w.x1 - w.x0 + 1,
+                  .height = w.y1 - w.y0 + 1,
+                  .window = w};
     return RL_OK;
 }
 
@@ -60,7 +84,8 @@ static void coverage_row(void *ctx, int y)
         out[x] = in[x] ? 1.0f : 0.0f;
 }
 
-static rl_code make_coverage(const rl_sink_frame *f, const region *r, rl_pool *pool, float **out, rl_error *err)
+static rl_code make_coverage(const rl_sink_frame *f, const region *r, rl_pool *pool, float **out,
+                             rl_error *err)
 {
     size_t bytes = (size_t)r->width * (size_t)r->height * sizeof **out;
     *out = rl_aligned(bytes);
@@ -114,7 +139,8 @@ static void list_begin(channel_list *list, const rl_sink_image *images, size_t n
 
 static void add_channel(channel_list *list, const char *layer, const char *letter, rl_exr_source source)
 {
-    source.name = *layer ? rl_arena_printf(&list->arena, "%s.%s", layer, letter) : rl_arena_strdup(&list->arena, letter);
+    source.name = *layer ? rl_arena_printf(&list->arena, "%s.%s", layer, letter)
+                         : rl_arena_strdup(&list->arena, letter);
     list->failed |= !source.name;
     if (!list->failed)
         list->rows[list->n++] = source;
@@ -127,7 +153,8 @@ static void add_image(channel_list *list, const rl_sink_image *image, rl_exr_pix
     size_t at = (size_t)r->y0 * image->stride + (size_t)r->x0;
     for (int i = 0; i < image->planes; i++) {
         const char *letter = i < n ? names[i] : rl_arena_printf(&list->arena, "V%d", i);
-        rl_exr_source s = {.stride = image->stride, .type = type, .floats = image->pixels + (size_t)i * image->plane + at};
+        rl_exr_source s = {
+            .stride = image->stride, .type = type, .floats = image->pixels + (size_t)i * image->plane + at};
         if (image->format == RL_ID) {
             s.type = RL_EXR_UINT;
             s.ids = (const uint32_t *)(const void *)s.floats;
@@ -140,8 +167,8 @@ static void add_image(channel_list *list, const rl_sink_image *image, rl_exr_pix
 }
 
 /* An rgb image carries coverage as A: its own layer's, or the file's when several layers share it. */
-static void add_coverage(channel_list *list, const rl_sink_image *images, size_t n, const float *coverage, int width,
-                         rl_exr_pixel type)
+static void add_coverage(channel_list *list, const rl_sink_image *images, size_t n, const float *coverage,
+                         int width, rl_exr_pixel type)
 {
     for (size_t i = 0; i < n; i++)
         if (images[i].format == RL_RGB)
@@ -165,7 +192,8 @@ static rl_exr_value rational_fps(double fps)
 }
 
 /* `colors`: the file holds an rgb image. Data has neither primaries nor a colour space. */
-static size_t add_attributes(const rl_sink_output *o, const rl_sink_frame *f, bool colors, rl_exr_attribute *attrs)
+static size_t add_attributes(const rl_sink_output *o, const rl_sink_frame *f, bool colors,
+                             rl_exr_attribute *attrs)
 {
     size_t n = 0;
     attrs[n++] = (rl_exr_attribute){"relit:version", {.type = RL_EXR_T_STRING, .text = RL_VERSION}};
@@ -226,8 +254,9 @@ static rl_code write_exr(const char *path, const rl_sink_output *o, const rl_sin
     return code;
 }
 
-rl_code rl_sink_write(const char *path, const rl_sink_output *output, const rl_sink_image *images, size_t n_images,
-                      const rl_sink_frame *frame, rl_pool *pool, uint64_t *clamped, rl_error *err)
+rl_code rl_sink_write(const char *path, const rl_sink_output *output, const rl_sink_image *images,
+                      size_t n_images, const rl_sink_frame *frame, rl_pool *pool, uint64_t *clamped,
+                      rl_error *err)
 {
     region r;
     float *coverage = NULL;
@@ -241,8 +270,8 @@ rl_code rl_sink_write(const char *path, const rl_sink_output *output, const rl_s
     if (!code && !strcasecmp(rl_path_extension(path), ".exr"))
         code = write_exr(path, output, images, n_images, frame, &r, coverage, pool, clamped, err);
     else if (!code)
-        code = rl_sink_write_image(path, output, &images[0], (size_t)r.y0 * images[0].stride + (size_t)r.x0, r.width,
-                                   r.height, frame, pool, clamped, err);
+        code = rl_sink_write_image(path, output, &images[0], (size_t)r.y0 * images[0].stride + (size_t)r.x0,
+                                   r.width, r.height, frame, pool, clamped, err);
     rl_free(coverage);
     rl_arena_free(&arena);
     return code;

@@ -1,5 +1,5 @@
-/* Writes one output of one frame: planes of the plan's buffers into an EXR, or another image format through the
- * OpenImageIO module. Called by the writer's thread. */
+/* Writes one output of one frame: planes of the plan's buffers into an EXR, or another image format through
+ * the OpenImageIO module. Called by the writer's thread. */
 #ifndef RL_RUN_SINK_H
 #define RL_RUN_SINK_H
 
@@ -39,10 +39,11 @@ typedef struct rl_sink_output {
     rl_primaries primaries; /* known: chromaticities are written */
 } rl_sink_output;
 
-/* `path` is the final name; the file is whole or not there. *clamped grows by the samples beyond the range of the file's type.
- * RL_E_DATA when the crop misses the data window. */
-rl_code rl_sink_write(const char *path, const rl_sink_output *output, const rl_sink_image *images, size_t n_images,
-                      const rl_sink_frame *frame, rl_pool *pool, uint64_t *clamped, rl_error *err);
+/* `path` is the final name; the file is whole or not there. *clamped grows by the samples beyond the range of
+ * the file's type. RL_E_DATA when the crop misses the data window. */
+rl_code rl_sink_write(const char *path, const rl_sink_output *output, const rl_sink_image *images,
+                      size_t n_images, const rl_sink_frame *frame, rl_pool *pool, uint64_t *clamped,
+                      rl_error *err);
 
 #ifdef __cplusplus
 }

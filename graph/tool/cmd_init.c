@@ -97,14 +97,16 @@ static void add_lights(rl_str *out, const rl_manifest *m)
     if (m->lights.n) {
         rl_str_add(out,
                    "\n# The capture's own lights are used, as they were recorded. Uncomment to re-light:\n"
-                   "# intensity in W/sr, positions in metres, shadow: a layer, screen (found in the depth buffer, slower) or none.\n"
+                   "# intensity in W/sr, positions in metres, shadow: a layer, screen (found in the depth "
+                   "buffer, slower) or none.\n"
                    "#lights:\n");
         for (size_t i = 0; i < m->lights.n; i++)
             add_light(out, &m->lights.light[i]);
         return;
     }
     rl_str_add(out,
-               "\n# The capture has no lights. One to begin with, beside the camera: intensity in W/sr. With shadow: screen\n"
+               "\n# The capture has no lights. One to begin with, beside the camera: intensity in W/sr. With "
+               "shadow: screen\n"
                "# its shadows are found in the depth buffer, which takes longer (relit passes lighting).\n"
                "lights:\n"
                "  key: {type: point, space: camera, position: [-0.5, 0.5, 0], intensity: 2, shadow: none}\n");

@@ -9,7 +9,8 @@
 #include "graph/tool/tool.h"
 
 static const char *const role_names[] = {"in", "out", "history", "scratch"};
-static const char *const type_names[] = {"number", "integer", "true|false", "word", "rgb", "list", "materials"};
+static const char *const type_names[] = {"number", "integer", "true|false", "word",
+                                         "rgb",    "list",    "materials"};
 
 /* `pass: kernel` has no table: its ports and parameters are the user's. A test runs the example. */
 static const char kernel_name[] = "kernel";
@@ -94,8 +95,9 @@ static void print_forms(const rl_param *row, int indent, rl_str *out)
 {
     for (size_t i = 0; i < row->forms.n; i++) {
         const rl_form *form = &row->forms.rows[i];
-        rl_str_printf(out, "%*s%s: %s needs %s%s%s: %s; %s\n", indent, "", row->form_row, form->word, form->from[0],
-                      form->from[1] ? ", " : "", form->from[1] ? form->from[1] : "", form->formula, form->source);
+        rl_str_printf(out, "%*s%s: %s needs %s%s%s: %s; %s\n", indent, "", row->form_row, form->word,
+                      form->from[0], form->from[1] ? ", " : "", form->from[1] ? form->from[1] : "",
+                      form->formula, form->source);
     }
 }
 
@@ -164,8 +166,8 @@ static json_t *forms_json(const rl_param *row)
     for (size_t i = 0; i < row->forms.n; i++) {
         const rl_form *form = &row->forms.rows[i];
         json_array_append_new(list, json_pack("{s:s, s:[s, s*], s:s, s:s}", row->form_row, form->word, "from",
-                                              form->from[0], form->from[1], "formula", form->formula, "source",
-                                              form->source));
+                                              form->from[0], form->from[1], "formula", form->formula,
+                                              "source", form->source));
     }
     return list;
 }

@@ -5,8 +5,8 @@
 #include "graph/tool/svg.h"
 #include "graph/tool/tool.h"
 
-static rl_code print_capture(const rl_session *session, size_t capture, rl_plan_word word, const rl_options *options,
-                             rl_str *out, rl_error *err)
+static rl_code print_capture(const rl_session *session, size_t capture, rl_plan_word word,
+                             const rl_options *options, rl_str *out, rl_error *err)
 {
     static const rl_plan_format formats[] = {RL_PLAN_TEXT, RL_PLAN_DOT, RL_PLAN_DOT, RL_PLAN_JSON};
     char *text = NULL;

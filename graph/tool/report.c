@@ -242,7 +242,9 @@ void rl_report_run_end(rl_reporter *r, const rl_run_summary *s, bool stopped)
     pthread_mutex_lock(&r->lock);
     hide_bar(r);
     if (stopped)
-        fprintf(r->err, "stopped: %zu frames were finished, the others were not begun; the same command with --resume goes on\n",
+        fprintf(r->err,
+                "stopped: %zu frames were finished, the others were not begun; the same command with "
+                "--resume goes on\n",
                 s->frames);
     if (s->failed)
         fprintf(r->err, "%zu of %zu frames failed:\n%s", s->failed, s->frames, rl_str_text(&r->failed));

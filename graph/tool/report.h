@@ -21,13 +21,13 @@ typedef struct rl_reporter {
     rl_log log;                    /* hand &log to whatever reports; any thread */
     uint64_t seen[RL_REPORT_SEEN]; /* hashes of the warnings and notes that were printed: each once */
     size_t n_seen;
-    bool bar;        /* a progress bar stands on the terminal's last line */
-    uint64_t bar_at; /* ns, when it was drawn */
-    uint64_t begin;  /* ns on CLOCK_MONOTONIC */
+    bool bar;                   /* a progress bar stands on the terminal's last line */
+    uint64_t bar_at;            /* ns, when it was drawn */
+    uint64_t begin;             /* ns on CLOCK_MONOTONIC */
     long long stages[RL_LANES]; /* the frame that each stage is at, */
     bool staged[RL_LANES];      /* if it is at one */
     size_t done, total;         /* of the last frame that was reported */
-    rl_str failed; /* a line for each frame that failed: "monkey frame 3: why" */
+    rl_str failed;              /* a line for each frame that failed: "monkey frame 3: why" */
     size_t n_files;
 } rl_reporter;
 

@@ -1,5 +1,5 @@
-/* Fuzzing without a fuzzing engine: seeds are changed by a deterministic mutator, and every input is known by its target, the
- * run's seed and its number, so that `fuzz TARGET --seed S --only N` does one again. */
+/* Fuzzing without a fuzzing engine: seeds are changed by a deterministic mutator, and every input is known by
+ * its target, the run's seed and its number, so that `fuzz TARGET --seed S --only N` does one again. */
 #ifndef RL_TESTS_FUZZ_H
 #define RL_TESTS_FUZZ_H
 
@@ -18,7 +18,8 @@ typedef struct fuzz_target {
     bool text;        /* lines and words are moved, too */
     /* Files that every input of the target needs, in `folder`; the seeds. */
     size_t (*begin)(const char *folder, fuzz_bytes *seeds, size_t room);
-    /* Feeds one input; ends the process with a message when a promise is broken. Whether relit accepted it. */
+    /* Feeds one input; ends the process with a message when a promise is broken. Whether relit accepted it.
+     */
     bool (*one)(const char *folder, const uint8_t *data, size_t size);
     void (*end)(void); /* may be NULL */
 } fuzz_target;
@@ -28,12 +29,15 @@ extern const size_t fuzz_n_targets;
 
 enum { FUZZ_MOST_SEEDS = 32, FUZZ_MOST_BYTES = 1 << 16 };
 
-/* The n-th input of a run: a seed, changed one to a dozen times. Returns its size; `out` holds FUZZ_MOST_BYTES. */
-size_t fuzz_mutate(const fuzz_target *target, const fuzz_bytes *seeds, size_t n_seeds, uint64_t seed, uint64_t n, uint8_t *out);
+/* The n-th input of a run: a seed, changed one to a dozen times. Returns its size; `out` holds
+ * FUZZ_MOST_BYTES. */
+size_t fuzz_mutate(const fuzz_target *target, const fuzz_bytes *seeds, size_t n_seeds, uint64_t seed,
+                   uint64_t n, uint8_t *out);
 
-/* Inputs from `first` on until `seconds` have passed or `most` have been tried; returns how many, and in *accepted (may be
- * NULL) how many were fine input after all. A broken promise, a crash,
- * or an input that takes over 20 s ends the process and names the input on stderr. */
-uint64_t fuzz_run(const fuzz_target *target, uint64_t seed, uint64_t first, uint64_t most, double seconds, uint64_t *accepted);
+/* Inputs from `first` on until `seconds` have passed or `most` have been tried; returns how many, and in
+ * *accepted (may be NULL) how many were fine input after all. A broken promise, a crash, or an input that
+ * takes over 20 s ends the process and names the input on stderr. */
+uint64_t fuzz_run(const fuzz_target *target, uint64_t seed, uint64_t first, uint64_t most, double seconds,
+                  uint64_t *accepted);
 
 #endif

@@ -1,4 +1,5 @@
-/* fuzz [TARGET…] [--seconds S] [--seed N] [--only N]: `make fuzz` runs it under the sanitizers, every target, 60 s each. */
+/* fuzz [TARGET…] [--seconds S] [--seed N] [--only N]: `make fuzz` runs it under the sanitizers, every target,
+ * 60 s each. */
 #include "tests/fuzz/fuzz.h"
 
 #include <stdio.h>

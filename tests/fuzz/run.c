@@ -51,7 +51,8 @@ static double now_s(void)
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-uint64_t fuzz_run(const fuzz_target *target, uint64_t seed, uint64_t first, uint64_t most, double seconds, uint64_t *accepted)
+uint64_t fuzz_run(const fuzz_target *target, uint64_t seed, uint64_t first, uint64_t most, double seconds,
+                  uint64_t *accepted)
 {
     fuzz_bytes seeds[FUZZ_MOST_SEEDS] = {0};
     char *folder = folder_new();
@@ -62,8 +63,8 @@ uint64_t fuzz_run(const fuzz_target *target, uint64_t seed, uint64_t first, uint
     uint64_t n = 0, fine = 0;
     catch_all();
     for (double end = now_s() + seconds; n < most && now_s() < end; n++) {
-        snprintf(line, sizeof line, "\ninput: %s --seed %llu --only %llu\n", target->name, (unsigned long long)seed,
-                 (unsigned long long)(first + n));
+        snprintf(line, sizeof line, "\ninput: %s --seed %llu --only %llu\n", target->name,
+                 (unsigned long long)seed, (unsigned long long)(first + n));
         size_t size = fuzz_mutate(target, seeds, n_seeds, seed, first + n, input);
         alarm(20);
         fine += target->one(folder, input, size);

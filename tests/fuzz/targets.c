@@ -65,7 +65,8 @@ static fuzz_bytes seed_file(const char *path)
     return b;
 }
 
-/* ---- configuration --------------------------------------------------------------------------------------- */
+/* ---- configuration ---------------------------------------------------------------------------------------
+ */
 
 static bool open_session(const char *folder)
 {
@@ -164,7 +165,8 @@ static bool one_manifest(const char *folder, const uint8_t *data, size_t size)
     return open_session(folder);
 }
 
-/* ---- EXR ------------------------------------------------------------------------------------------------- */
+/* ---- EXR -------------------------------------------------------------------------------------------------
+ */
 
 enum { W = 37, H = 21 };
 
@@ -180,10 +182,18 @@ static size_t begin_exr(const char *folder, fuzz_bytes *seeds, size_t room)
         halfs[i] = (uint16_t)(0x3000 + i);
         ids[i] = (uint32_t)(i / W);
     }
-    const made_channel channels[] = {
-        {"B", RL_EXR_HALF, 1, halfs}, {"G", RL_EXR_HALF, 1, halfs}, {"ID", RL_EXR_UINT, 1, ids}, {"Z", RL_EXR_FLOAT, 1, floats}};
+    const made_channel channels[] = {{"B", RL_EXR_HALF, 1, halfs},
+                                     {"G", RL_EXR_HALF, 1, halfs},
+                                     {"ID", RL_EXR_UINT, 1, ids},
+                                     {"Z", RL_EXR_FLOAT, 1, floats}};
     for (int c = 0; c < RL_EXR_DWAA && n + 3 < room; c++) {
-        made_part part = {.x0 = -3, .y0 = 2, .width = W, .height = H, .compression = (rl_exr_compression)c, .channels = channels, .n_channels = 4};
+        made_part part = {.x0 = -3,
+                          .y0 = 2,
+                          .width = W,
+                          .height = H,
+                          .compression = (rl_exr_compression)c,
+                          .channels = channels,
+                          .n_channels = 4};
         char *path = path_in(folder, "seed.exr");
         for (int tile = 0; tile <= 16; tile += 16) {
             part.tile = tile;
@@ -194,17 +204,32 @@ static size_t begin_exr(const char *folder, fuzz_bytes *seeds, size_t room)
     }
     char *path = path_in(folder, "seed.exr");
     for (rl_exr_compression c = RL_EXR_DWAA; c <= RL_EXR_DWAB; c++) {
-        const rl_exr_source sources[] = {{"R", RL_EXR_HALF, floats, NULL, W}, {"Z", RL_EXR_FLOAT, floats, NULL, W}};
-        const rl_exr_image image = {.data_window = {0, 0, W - 1, H - 1}, .display_window = {0, 0, W - 1, H - 1},
-                                    .channels = sources, .n_channels = 2, .compression = c};
+        const rl_exr_source sources[] = {{"R", RL_EXR_HALF, floats, NULL, W},
+                                         {"Z", RL_EXR_FLOAT, floats, NULL, W}};
+        const rl_exr_image image = {.data_window = {0, 0, W - 1, H - 1},
+                                    .display_window = {0, 0, W - 1, H - 1},
+                                    .channels = sources,
+                                    .n_channels = 2,
+                                    .compression = c};
         rl_error err = {0};
         if (rl_exr_write(path, &image, NULL, NULL, &err))
             broken("a seed can be written", &err);
         seeds[n++] = seed_file(path);
     }
-    const made_part parts[] = {
-        {.name = "one", .width = W, .height = H, .compression = RL_EXR_ZIP, .channels = channels, .n_channels = 4},
-        {.name = "two", .width = 8, .height = 8, .compression = RL_EXR_ZIPS, .tile = 8, .mipmap = true, .channels = channels, .n_channels = 2}};
+    const made_part parts[] = {{.name = "one",
+                                .width = W,
+                                .height = H,
+                                .compression = RL_EXR_ZIP,
+                                .channels = channels,
+                                .n_channels = 4},
+                               {.name = "two",
+                                .width = 8,
+                                .height = 8,
+                                .compression = RL_EXR_ZIPS,
+                                .tile = 8,
+                                .mipmap = true,
+                                .channels = channels,
+                                .n_channels = 2}};
     made_write(path, parts, 2);
     seeds[n++] = seed_file(path);
     free(path);
@@ -258,7 +283,8 @@ static bool one_exr(const char *folder, const uint8_t *data, size_t size)
     return fine;
 }
 
-/* ---- frames in memory ------------------------------------------------------------------------------------ */
+/* ---- frames in memory ------------------------------------------------------------------------------------
+ */
 
 /* One session processes all inputs: what an input did to it must not hurt the next. */
 static rl_session *frames;
@@ -283,7 +309,8 @@ static const char frame_pipeline[] =
     "    shadow_thickness: {key: m}\n"
     "profiles: {p: {scatter_distance_mm: [30, 12, 7], transmission: thick}}\n"
     "materials: {some: {profile: p, stencil: [0, 1, 2, 3]}, default: {}}\n"
-    "lights: {key: {type: point, position: [0.1, 0.2, 0.3], intensity: 1}, sun: {type: directional, direction: [0, 0, -1], irradiance: 3}}\n"
+    "lights: {key: {type: point, position: [0.1, 0.2, 0.3], intensity: 1}, sun: {type: directional, "
+    "direction: [0, 0, -1], irradiance: 3}}\n"
     "graph:\n"
     "  light: {pass: lighting}\n"
     "  sss: {pass: sss_burley, in: {diffuse: light.diffuse, lit: light.lit}, orientation: tangent}\n"
@@ -335,15 +362,16 @@ static bool one_frame(const char *folder, const uint8_t *data, size_t size)
     for (size_t i = 0; i < SAMPLES; i++)
         memcpy(&ids[i], &planes[0][i / 7], sizeof *ids);
     channels[CHANNELS] = (rl_channel_data){.name = "ID", .ids = ids, .stride = 200};
-    rl_frame_data frame = {.x = whole(v[2], -100000, 100000),
-                           .y = whole(v[3], -100000, 100000),
-                           .width = whole(v[0], -1, 200),
-                           .height = whole(v[1], -1, 200),
-                           .channels = channels,
-                           .n_channels = CHANNELS + 1,
-                           .world_to_camera = {1, 0, 0, (double)v[7], 0, 1, 0, (double)v[8], 0, 0, 1, (double)v[9], 0, 0, 0, 1},
-                           .fov_x = (double)v[4],
-                           .jitter = {(double)v[5], (double)v[6]}};
+    rl_frame_data frame = {
+        .x = whole(v[2], -100000, 100000),
+        .y = whole(v[3], -100000, 100000),
+        .width = whole(v[0], -1, 200),
+        .height = whole(v[1], -1, 200),
+        .channels = channels,
+        .n_channels = CHANNELS + 1,
+        .world_to_camera = {1, 0, 0, (double)v[7], 0, 1, 0, (double)v[8], 0, 0, 1, (double)v[9], 0, 0, 0, 1},
+        .fov_x = (double)v[4],
+        .jitter = {(double)v[5], (double)v[6]}};
     rl_image_view image;
     rl_code code = rl_session_process(frames, 0, ++number, &frame, &err);
     check(code, &err);
@@ -364,6 +392,7 @@ const fuzz_target fuzz_targets[] = {
     {"kernel", "a user kernel's declaration, up to the plan", true, begin_kernel, one_pipeline, NULL},
     {"manifest", "a capture's YAML, up to the plan", true, begin_manifest, one_manifest, NULL},
     {"exr", "EXR files: headers, attributes, pixels", false, begin_exr, one_exr, NULL},
-    {"frame", "frames in memory: sizes, cameras, samples of any value, through the kernels", false, begin_frame, one_frame, end_frame},
+    {"frame", "frames in memory: sizes, cameras, samples of any value, through the kernels", false,
+     begin_frame, one_frame, end_frame},
 };
 const size_t fuzz_n_targets = sizeof fuzz_targets / sizeof *fuzz_targets;
