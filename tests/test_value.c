@@ -644,6 +644,19 @@ static void test_failing_memory(void **state)
     assert_true(n > 5);
 }
 
+static void test_paths(void **state)
+{
+    (void)state;
+    rl_arena arena = {0};
+    rl_value v = {.kind = RL_TEXT, .text = "b/c.exr", .where = {.file = "a/p.yaml", .line = 3, .column = 1}};
+    assert_string_equal(rl_value_path(&arena, &v), "a/b/c.exr");
+    v.where.file = "--set capture=b/c.exr"; /* the option's text is no folder */
+    assert_string_equal(rl_value_path(&arena, &v), "b/c.exr");
+    v.where = RL_NOWHERE;
+    assert_string_equal(rl_value_path(&arena, &v), "b/c.exr");
+    rl_arena_free(&arena);
+}
+
 int main(void)
 {
 #define T(f) cmocka_unit_test_setup_teardown(f, setup, teardown)
@@ -652,7 +665,7 @@ int main(void)
         T(test_core_schema),   T(test_places_and_texts), T(test_anchors),        T(test_bad_yaml),
         T(test_damaged_yaml),  F(test_includes),         F(test_bad_includes),   T(test_merge),
         T(test_set),           T(test_print_round_trip), T(test_keys),           T(test_numbers),
-        T(test_other_scalars), T(test_describe),         F(test_failing_memory),
+        T(test_other_scalars), T(test_describe),         F(test_failing_memory), T(test_paths),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
