@@ -18,8 +18,7 @@ static const rl_param params[] = {
            "the disk is parallel to the screen, or to the tangent plane that the depth gives",
            .structural = true),
     P_ENUM(sss_burley_params, weighting, "area|plain|surface", 0,
-           "what a sample stands for: the area that its pixel sees, its pixel alone, or that area not "
-           "normalized",
+           "a sample stands for the area that its pixel sees, its pixel, or area over the tangent plane's",
            .structural = true),
     P_ENUM(sss_burley_params, rotation, "none|white|ign|blue", 3,
            "how the pattern changes from pixel to pixel and from frame to frame; blue: neighbours complement "

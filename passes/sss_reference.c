@@ -13,8 +13,7 @@ static const rl_param params[] = {
            "the disk is parallel to the screen, or to the tangent plane that the depth gives",
            .structural = true),
     P_ENUM(sss_reference_params, weighting, "area|plain|surface", 0,
-           "what a sample stands for: the area that its pixel sees, its pixel alone, or that area not "
-           "normalized",
+           "a sample stands for the area that its pixel sees, its pixel, or area over the tangent plane's",
            .structural = true),
 };
 RL_PARAMS_MATCH(sss_reference_params, 2);

@@ -80,6 +80,7 @@ void rl_session_close(rl_session **session)
     *session = NULL;
     if (!s)
         return;
+    rl_session_end_views(s);
     rl_frame_free(&s->frame);
     for (size_t i = 0; i < s->n_sequences; i++)
         rl_sequence_close(&s->sequences[i]);

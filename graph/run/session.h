@@ -70,7 +70,13 @@ struct rl_session {
     rl_frame frame;
     rl_sequence *frame_sequence; /* NULL: none yet */
     bool processed;
+    rl_memory *
+        *viewed; /* mapped for rl_session_image until the next call that processes or closes; owned array */
+    size_t n_viewed;
 };
+
+/* session_run.c: ends what rl_session_image gave out. */
+void rl_session_end_views(rl_session *session);
 
 /* session_color.c: opens the OCIO config, checks every colour name, makes the passes of the outputs. */
 rl_code rl_session_colors(rl_session *session, rl_error *err);

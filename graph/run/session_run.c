@@ -142,9 +142,8 @@ rl_code rl_session_write_frame(rl_session *s, rl_sequence *q, rl_frame *f, const
             files[(*n_files)++] = path;
         rl_session_span(hooks, q, f, RL_LANE_WRITE, "encode", s->outputs[i].spec->name, start);
     }
-    if (memory)
-        rl_memory_unmap(memory, NULL);
-    return code;
+    rl_code unmapped = memory ? rl_memory_unmap(memory, code ? NULL : err) : RL_OK;
+    return code ? code : unmapped;
 }
 
 /* ---- one frame -------------------------------------------------------------------------------------------
@@ -162,6 +161,7 @@ rl_code rl_session_process(rl_session *s, size_t capture, long long number, cons
     rl_error local = {0};
     err = err ? err : &local;
     s->processed = false;
+    rl_session_end_views(s);
     if (capture >= s->n_sequences)
         return rl_fail(err, RL_E_USAGE, RL_NOWHERE, "there is no capture %zu", capture);
     if (number < INT_MIN || number > INT_MAX)
@@ -190,15 +190,36 @@ rl_code rl_session_process(rl_session *s, size_t capture, long long number, cons
 }
 
 /* The output layer that shows an image as it is, without a colour transform. */
-static int find_kept(const rl_session *s, const rl_sequence *q, const char *image)
+static int find_kept(const rl_sequence *q, const char *image)
 {
     int wanted = rl_graph_find(q->graph, image);
     for (size_t i = 0; wanted >= 0 && i < q->graph->n_outputs; i++)
         for (size_t k = 0; k < q->graph->outputs[i].n_images; k++)
             if (q->graph->outputs[i].images[k] == wanted)
                 return q->plan->outputs[i][k];
-    (void)s;
     return -1;
+}
+
+void rl_session_end_views(rl_session *s)
+{
+    for (size_t i = 0; i < s->n_viewed; i++)
+        rl_memory_unmap(s->viewed[i], NULL); /* what was read has been read */
+    rl_free(s->viewed);
+    s->viewed = NULL;
+    s->n_viewed = 0;
+}
+
+/* A mapping must last as long as the view: only on host-memory devices is the pointer good without it. */
+static rl_code keep_view(rl_session *s, rl_memory *memory, rl_error *err)
+{
+    rl_memory **grown = rl_realloc(s->viewed, (s->n_viewed + 1) * sizeof *grown);
+    if (!grown) {
+        rl_memory_unmap(memory, NULL);
+        return rl_fail_memory(err, (s->n_viewed + 1) * sizeof *grown);
+    }
+    s->viewed = grown;
+    s->viewed[s->n_viewed++] = memory;
+    return RL_OK;
 }
 
 rl_code rl_session_image(rl_session *s, const char *image, rl_image_view *out, rl_error *err)
@@ -207,7 +228,7 @@ rl_code rl_session_image(rl_session *s, const char *image, rl_image_view *out, r
     if (!s->processed)
         return rl_fail(err, RL_E_USAGE, RL_NOWHERE, "no frame was processed");
     const rl_sequence *q = s->frame_sequence;
-    int buffer = find_kept(s, q, image);
+    int buffer = find_kept(q, image);
     if (buffer < 0)
         return rl_fail(
             err, RL_E_USAGE, RL_NOWHERE,
@@ -216,6 +237,9 @@ rl_code rl_session_image(rl_session *s, const char *image, rl_image_view *out, r
     rl_sink_image view = {0};
     rl_memory *memory;
     rl_code code = rl_session_map_image(q, &s->frame, buffer, &view, &memory, err);
+    if (code)
+        return code;
+    code = keep_view(s, memory, err);
     if (code)
         return code;
     restore_ids(&s->frame, image, &view);
@@ -229,7 +253,5 @@ rl_code rl_session_image(rl_session *s, const char *image, rl_image_view *out, r
                            .plane_stride = view.plane};
     for (int i = 0; i < view.planes && i < (int)(sizeof out->plane / sizeof *out->plane); i++)
         out->plane[i] = view.pixels + (size_t)i * view.plane;
-    /* The view stays valid on host-memory devices; others keep the mapping until the next map of the same
-     * buffer. */
-    return rl_memory_unmap(memory, err);
+    return RL_OK;
 }

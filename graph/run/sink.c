@@ -227,12 +227,14 @@ static rl_code write_exr(const char *path, const rl_sink_output *o, const rl_sin
     for (size_t i = 0; i < n; i++)
         colors |= images[i].format == RL_RGB;
     rl_exr_attribute attrs[8];
+    /* A name that the pipeline's parser let pass is one that the codec knows; rl_exr_write refuses any other
+     * number. */
     int compression = o->spec->compression ? rl_exr_compression_named(o->spec->compression) : RL_EXR_ZIP;
     rl_exr_image image = {.data_window = r->window,
                           .display_window = f->display_window,
                           .channels = list.rows,
                           .n_channels = list.n,
-                          .compression = compression < 0 ? RL_EXR_ZIP : (rl_exr_compression)compression,
+                          .compression = (rl_exr_compression)compression,
                           .level = o->spec->level,
                           .dwa_level = o->spec->quality > 0 ? (float)o->spec->quality : 0,
                           .attrs = attrs,
