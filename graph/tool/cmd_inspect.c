@@ -86,7 +86,26 @@ static rl_code print_file(const char *path, rl_str *out, rl_error *err)
 /* ---- how relit would read it ----------------------------------------------------------------------------
  */
 
-static void print_mapping(const rl_capture *capture, rl_str *out)
+/* A guessed manifest is to be saved beside the files: their names in it are without a folder. */
+static rl_code print_guess(rl_arena *arena, const rl_capture *capture, rl_str *out, rl_error *err)
+{
+    rl_manifest m = *capture->manifest;
+    rl_pattern *patterns = rl_arena_array(arena, (size_t)m.n_patterns + 1, sizeof *patterns);
+    const char *folder = m.n_patterns ? rl_path_folder(arena, m.patterns[0].path) : ".";
+    if (!patterns || !folder)
+        return rl_fail_memory(err, sizeof *patterns);
+    for (int i = 0; i < m.n_patterns; i++) {
+        patterns[i] = m.patterns[i];
+        patterns[i].path = rl_path_name(m.patterns[i].path);
+    }
+    m.patterns = patterns;
+    rl_str_printf(out, "# guessed by preset '%s': check units and spaces, then save it as %s/capture.yaml\n",
+                  capture->preset, folder);
+    rl_manifest_print(&m, out);
+    return RL_OK;
+}
+
+static rl_code print_mapping(rl_arena *arena, const rl_capture *capture, rl_str *out, rl_error *err)
 {
     rl_str_add(out, "\n");
     if (capture->missing) {
@@ -95,14 +114,13 @@ static void print_mapping(const rl_capture *capture, rl_str *out)
             rl_str_printf(out, " in '%s', which fits best", capture->preset);
         rl_str_add(out, "\n# write a capture.yaml that says which channels hold albedo, normal, depth and "
                         "stencil\n");
-        return;
+        return RL_OK;
     }
-    if (capture->file)
-        rl_str_printf(out, "# %s, as relit reads it\n", capture->file);
-    else
-        rl_str_printf(out, "# guessed by preset '%s': check units and spaces, then save it as capture.yaml\n",
-                      capture->preset);
+    if (!capture->file)
+        return print_guess(arena, capture, out, err);
+    rl_str_printf(out, "# %s, as relit reads it\n", capture->file);
     rl_manifest_print(capture->manifest, out);
+    return RL_OK;
 }
 
 /* The files of the first frame, each once, and the manifest. */
@@ -114,9 +132,7 @@ static rl_code print_capture(rl_tool *tool, const char *path, rl_str *out, rl_er
         char *first = rl_capture_first(tool->arena, capture.manifest, i);
         code = first ? print_file(first, out, err) : rl_fail_memory(err, strlen(path));
     }
-    if (!code)
-        print_mapping(&capture, out);
-    return code;
+    return code ? code : print_mapping(tool->arena, &capture, out, err);
 }
 
 /* ---- a folder of files ----------------------------------------------------------------------------------
@@ -194,6 +210,20 @@ static rl_code print_folder(rl_tool *tool, const char *folder, rl_str *out, rl_e
     return code;
 }
 
+/* One file: what it holds, and the manifest of the sequence that its number belongs to. */
+static rl_code print_one(rl_tool *tool, const char *path, rl_str *out, rl_error *err)
+{
+    const char *folder = rl_path_folder(tool->arena, path);
+    const char *pattern = folder ? pattern_of(tool->arena, folder, rl_path_name(path)) : NULL;
+    rl_capture capture;
+    if (!pattern)
+        return rl_fail_memory(err, strlen(path));
+    rl_code code = print_file(path, out, err);
+    if (!code)
+        code = rl_capture_find(tool->arena, pattern, &tool->report->log, &capture, err);
+    return code ? code : print_mapping(tool->arena, &capture, out, err);
+}
+
 int rl_cmd_inspect(rl_tool *tool, rl_error *err)
 {
     rl_str text = {0};
@@ -205,6 +235,8 @@ int rl_cmd_inspect(rl_tool *tool, rl_error *err)
         code = rl_fail_memory(err, strlen(path));
     else if (folder && !rl_path_exists(manifest))
         code = print_folder(tool, path, &text, err);
+    else if (!strcasecmp(rl_path_extension(path), ".exr") && rl_path_exists(path))
+        code = print_one(tool, path, &text, err);
     else
         code = print_capture(tool, path, &text, err);
     if (!code)
