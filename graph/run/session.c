@@ -91,14 +91,19 @@ void rl_session_close(rl_session **session)
     rl_free(s);
 }
 
+static rl_code prepare_sequence(rl_session *s, rl_sequence *q, rl_error *err)
+{
+    rl_scene scene = {q->materials, q->march};
+    return rl_executor_new(s->device, q->plan, &scene, 1, s->threads, s->log, &q->executor, err);
+}
+
 rl_code rl_session_prepare(rl_session *s, rl_error *err)
 {
     rl_code code =
         s->device ? RL_OK : rl_device_open(s->options.device, s->options.threads, s->log, &s->device, err);
     for (size_t i = 0; i < s->n_sequences && !code; i++)
         if (!s->sequences[i].executor)
-            code = rl_executor_new(s->device, s->sequences[i].plan, s->sequences[i].materials,
-                                   s->sequences[i].march, s->threads, s->log, &s->sequences[i].executor, err);
+            code = prepare_sequence(s, &s->sequences[i], err);
     return code;
 }
 

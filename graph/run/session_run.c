@@ -35,11 +35,8 @@ rl_code rl_session_execute(rl_session *s, rl_sequence *q, rl_frame *f, rl_span *
     if (is_cut(q, f))
         rl_executor_cut(q->executor);
     rl_session_light_values(q, &f->camera, q->light_values);
-    rl_frame_values values = {.number = f->number,
-                              .camera = f->camera,
-                              .lights = q->light_values,
-                              .n_lights = (int)q->n_lights,
-                              .ambient = &s->ambient};
+    rl_scene_values scene = {q->light_values, (int)q->n_lights, &s->ambient};
+    rl_frame_values values = {.number = f->number, .camera = f->camera, .scenes = &scene};
     code = rl_executor_run(q->executor, f->buffers, &values, spans, err);
     q->has_last = !code;
     q->last_number = f->number;
