@@ -241,6 +241,9 @@ typedef struct rl_pass {
      * holds elsewhere. */
     double (*least_share)(const void *params);
     const char *fades_where;
+    /* Passes with a parameter `seed`: whether the result depends on it; `march`: some light has `shadow:
+     * screen`. NULL: it always does. */
+    bool (*stochastic)(const void *params, bool march);
 } rl_pass;
 
 /* The struct holds the table's 4-byte fields and nothing else; RGB rows count three. */

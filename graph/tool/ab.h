@@ -35,6 +35,8 @@ typedef struct rl_ab_plan {
     const rl_ab_pair *pairs; /* of listed variants */
     size_t n_pairs;
     const char *against; /* --against: a file or a folder, or NULL */
+    bool stochastic;     /* some pass of the first variant has a seed that its result depends on */
+    int seeds;           /* of the first variant: 1 + replicates */
 } rl_ab_plan;
 
 /* Reads the variants' pipelines as values, no pixel, no capture. Errors are of the command line and of YAML.
