@@ -37,7 +37,8 @@ static rl_code parse_list(rl_arena *arena, const char *text, size_t path, const 
         return rl_fail_memory(err, strlen(text));
     rl_code code = rl_yaml_parse(arena, list, strlen(list), option, out, &inner);
     if (code == RL_E_CONFIG || code == RL_E_FORMAT)
-        return rl_fail(err, RL_E_USAGE, (rl_where){inner.file, inner.line, inner.column},
+        return rl_fail(err, RL_E_USAGE, /* the end of the text is line 2 to the parser */
+                       (rl_where){inner.file, 1, inner.line > 1 ? (int)strlen(text) + 1 : inner.column},
                        "behind '=' the inside of a YAML list is expected, such as 8,16 or [3, 1.2, 0.7],[6, "
                        "5, 3]: %s",
                        inner.text);

@@ -52,7 +52,7 @@ static rl_code check_path(const applier *a, const rl_vary *vary)
         const char **known = rl_arena_array(a->arena, n + 1, sizeof *known);
         if (!key || !known)
             return rl_fail_memory(a->err, (n + 1) * sizeof *known);
-        if (rl_value_get(section, key))
+        if (!*key || rl_value_get(section, key)) /* rl_value_set refuses "graph..taps" */
             return RL_OK;
         for (size_t k = 0; k < n; k++)
             known[k] = section->entries[k].key;
