@@ -89,7 +89,7 @@ $(BUILD)/relit: $(MAIN_O) $(BUILD)/tool.a $(BUILD)/librelit.a
 
 $(BUILD)/relit_oiio.so: $(MODULE_CXX:%.cc=$(BUILD)/%.o)
 	$(call say,link $@)
-	$(Q)$(CXX) $(LDFLAGS) -shared -o $@ $^ $(shell pkg-config --libs OpenImageIO)
+	$(Q)$(CXX) $(LDFLAGS) -shared -o $@ $^ $(shell pkg-config --libs OpenImageIO fontconfig)
 
 # Kernels are built into the library, so that it runs from anywhere; $RELIT_KERNELS overrides them.
 $(BUILD)/kernels.c: $(KERNELS) Makefile
@@ -139,7 +139,7 @@ $(BUILD)/tests/%: $(BUILD)/tests/%.o $(BUILD)/tests/sanitizers.o $(BUILD)/tests/
 	$(Q)$(CC) $(LDFLAGS) -o $@ $^ $(LIBS) -lcmocka
 
 # They load the module; so does whatever writes PNG files.
-$(BUILD)/tests/test_image_file $(BUILD)/tests/test_sg_run $(BUILD)/tests/test_diff: | $(BUILD)/relit_oiio.so
+$(BUILD)/tests/test_image_file $(BUILD)/tests/test_sg_run $(BUILD)/tests/test_diff $(BUILD)/tests/test_ab_sheet $(BUILD)/tests/test_ab: | $(BUILD)/relit_oiio.so
 
 test-build: all $(TESTS) $(BENCHES)
 
@@ -182,7 +182,8 @@ slurm-test: all
 # ---- the rest --------------------------------------------------------------------------------------------------
 
 DEB = build-essential pkg-config libopenexr-dev libopenimageio-dev libopencolorio-dev pocl-opencl-icd ocl-icd-opencl-dev \
-      opencl-headers libyaml-dev libjansson-dev libxxhash-dev libdeflate-dev libisal-dev libcmocka-dev libgraphviz-dev clang-format
+      opencl-headers libyaml-dev libjansson-dev libxxhash-dev libdeflate-dev libisal-dev libcmocka-dev libgraphviz-dev clang-format \
+      libfontconfig-dev fonts-dejavu-core
 
 # Asks for root rights only when something is missing.
 deps:
