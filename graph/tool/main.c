@@ -13,6 +13,26 @@ static const command commands[] = {
       "outputs. A file under its final name is whole. A frame that fails does not stop\n"
       "the others.\n"},
      rl_cmd_run},
+    {{"ab", RL_CMD_AB, "PIPELINE...", "compare variants; write a report",
+      "Runs variants of a pipeline together (--vary), or several pipelines, or every\n"
+      "variant of each. What they share runs once; their pictures have the same bits\n"
+      "as runs of their own, and go to a folder each below --out.\n"
+      "\n"
+      "    relit ab configs/skin.yaml --vary profiles.skin.texturing=post,pre_post\n"
+      "    relit ab a.yaml b.yaml --frames 1-24 --fail-over flip.p95=0.05\n"
+      "    relit ab p.yaml --vary graph.sss.taps=8,16,21,40,55 --sheet\n"
+      "    relit ab p.yaml --vary graph.sss.pass=sss_burley,sss_gaussian,combine\n"
+      "\n"
+      "report.html shows where they differ (one file, opens offline), metrics.json\n"
+      "has every number, junit.xml is for CI. Each variant is compared with the first\n"
+      "one; --pairs and --against choose others. Where chance has a part, the first\n"
+      "variant runs with other seeds too, and differences that chance explains are\n"
+      "marked. A pass that --vary graph.NODE.pass puts in place of another drops the\n"
+      "parameters and inputs that it lacks, and says so.\n"
+      "\n"
+      "--fail-over METRIC.STAT=X, such as flip.p95=0.05 or psnr.mean=40, is about every\n"
+      "frame and material; energy=X about the light that a pass loses or makes.\n"},
+     rl_cmd_ab},
     {{"diff", RL_CMD_DIFF, "A B", "compare an image with a reference",
       "Compares image B with the reference A and prints mean, median, 95th percentile\n"
       "and maximum of a metric. EXR files: channels R, G, B, or the only layer. A file\n"
@@ -23,7 +43,9 @@ static const command commands[] = {
       "Reads the pipeline, opens the headers of the capture, makes the plan and\n"
       "compiles the kernels. Writes nothing.\n"},
      rl_cmd_check},
-    {{"plan", RL_CMD_PLAN, "PIPELINE", "show the graph: order, lifetimes, memory, culled passes", NULL},
+    {{"plan", RL_CMD_PLAN, "PIPELINE...", "show the graph: order, lifetimes, memory, culled passes",
+      "With --vary, or with several pipelines: what the variants share when `relit ab`\n"
+      "runs them together, and what that costs against running one.\n"},
      rl_cmd_plan},
     {{"init", RL_CMD_INIT, "CAPTURE", "print a starter pipeline for a capture",
       "CAPTURE is a capture.yaml, a folder that holds one, or an EXR file or pattern.\n"

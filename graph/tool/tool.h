@@ -31,6 +31,7 @@ int rl_cmd_init(rl_tool *tool, rl_error *err);
 int rl_cmd_inspect(rl_tool *tool, rl_error *err);
 int rl_cmd_passes(rl_tool *tool, rl_error *err);
 int rl_cmd_devices(rl_tool *tool, rl_error *err);
+int rl_cmd_ab(rl_tool *tool, rl_error *err);
 int rl_cmd_diff(rl_tool *tool, rl_error *err);
 int rl_cmd_bench(rl_tool *tool, rl_error *err);
 
