@@ -78,6 +78,24 @@ int rl_tool_print(rl_tool *tool, rl_str *s, rl_error *err)
     return err->code ? RL_EXIT_WRONG : RL_EXIT_DONE;
 }
 
+/* "relit ab configs/skin.yaml --vary 'a=[1, 2],3'". NULL when memory is out. */
+static const char *command_line(rl_arena *arena, int argc, char **argv)
+{
+    static const char plain[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-./=,:+@%";
+    rl_str s = {0};
+    rl_str_add(&s, "relit");
+    for (int i = 1; i < argc; i++) {
+        bool quoted = !*argv[i] || argv[i][strspn(argv[i], plain)];
+        rl_str_add(&s, quoted ? " '" : " ");
+        for (const char *c = argv[i]; *c; c++)
+            rl_str_addn(&s, *c == '\'' ? "'\\''" : c, *c == '\'' ? 4 : 1);
+        rl_str_add(&s, quoted ? "'" : "");
+    }
+    const char *line = s.failed ? NULL : rl_arena_strdup(arena, rl_str_text(&s));
+    rl_str_free(&s);
+    return line;
+}
+
 static int run_command(rl_tool *tool, const rl_commands *infos, int argc, char **argv, rl_error *err)
 {
     size_t index;
@@ -90,6 +108,11 @@ static int run_command(rl_tool *tool, const rl_commands *infos, int argc, char *
         rl_str text = {0};
         rl_help_command(&c->info, &text);
         return rl_tool_print(tool, &text, err);
+    }
+    tool->command = command_line(tool->arena, argc, argv);
+    if (!tool->command) {
+        rl_fail_memory(err, 256);
+        return RL_EXIT_WRONG;
     }
     tool->args.run.pipeline = tool->args.operand;
     tool->args.run.log = &tool->report->log;
