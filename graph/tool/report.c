@@ -163,8 +163,11 @@ static void frame_json(rl_reporter *r, const rl_frame_result *f)
 static void frame_line(rl_reporter *r, const rl_frame_result *f)
 {
     fprintf(r->err, "[%zu/%zu] %s frame %lld:", f->done, f->total, f->capture, f->frame);
-    for (size_t i = 0; i < f->n_files; i++)
+    bool many = f->load_s < 0 && f->n_files > 4; /* of many variants, which --json lists */
+    for (size_t i = 0; i < f->n_files && !many; i++)
         fprintf(r->err, " %s", f->files[i]);
+    if (many)
+        fprintf(r->err, " %zu files", f->n_files);
     fprintf(r->err, "%s\n", f->n_files ? "" : " nothing written");
     fflush(r->err);
 }
