@@ -54,7 +54,8 @@ void rl_help_command(const rl_command_info *command, rl_str *out)
         strcpy(left, "--");
         strncat(left, o->name, 30);
         if (o->argument) {
-            strcat(left, " ");
+            if (o->kind != MAYBE) /* "--sheet[=FILE]" */
+                strcat(left, " ");
             strncat(left, o->argument, 28);
         }
         add_row(out, OPTION_COLUMN, left, o->help);

@@ -24,15 +24,15 @@ const option rl_options_table[] = {
              "such as graph.sss.taps=55; null removes it;\n"
              "may be repeated"},
     {"vary", "PATH=V1,V2,..", RL_CMD_AB | RL_CMD_PLAN, LIST, AT(vary), .count = offsetof(rl_arguments, n_vary),
-     .help = "a variant for each of these values; behind '=' is the\n"
-             "inside of a YAML list: 8,16 or [3, 1.2, 0.7],[6, 5, 3];\n"
+     .help = "a variant for each of these values: the inside of a\n"
+             "YAML list, such as 8,16 or [3, 1.2, 0.7],[6, 5, 3];\n"
              "several make the full grid"},
     {"pairs", NULL, RL_CMD_AB, FLAG, AT(pairs),
      .help = "compare neighbours: variants one step apart in one\n"
              "--vary; default: each with the first"},
     {"against", "FILE|DIR", RL_CMD_AB, TEXT, AT(against),
-     .help = "compare each variant with this picture, or with those\n"
-             "of this folder, instead of the first variant"},
+     .help = "compare each variant with this picture, or with the\n"
+             "pictures of this folder, not with the first variant"},
     {"seeds", "N", RL_CMD_AB, INTEGER, AT(seeds), .min = 1, .max = 64,
      .help = "render the first variant with N seeds, to tell what\n"
              "chance alone makes; default: 3; 1: do not"},
@@ -73,8 +73,8 @@ const option rl_options_table[] = {
     {"format", "WORD", RL_CMD_PLAN, WORD, AT(format), .words = "text|dot|svg|json",
      .help = "text (default), dot, svg or json"},
     {"json", NULL, TIMED | RL_CMD_PASSES | RL_CMD_DEVICES | RL_CMD_DIFF, FLAG, AT(json),
-     .help = "print JSON on stdout (run: an object a frame, each\n"
-             "on its line)"},
+     .help = "print JSON on stdout (run, ab: an object a frame,\n"
+             "each on its line)"},
     {"markdown", NULL, RL_CMD_PASSES, FLAG, AT(markdown),
      .help = "print Markdown tables, as in passes/README.md"},
     {"size", "WxH", RL_CMD_BENCH, SIZE, AT(size),
@@ -91,11 +91,13 @@ const option rl_options_table[] = {
              "over X (psnr and ssim: under X); may be repeated;\n"
              "ab: of any frame or material, and energy=X too"},
     {"sheet", "[=FILE]", RL_CMD_AB, MAYBE, AT(sheet),
-     .help = "write one picture with a labelled tile a variant and\n"
-             "its FLIP against the last; default: sheet.png in --out"},
+     .help = "write one picture with a labelled tile a variant, and\n"
+             "its FLIP against the last; default: sheet.png, in\n"
+             "--out"},
     {"report-frames", "SPEC", RL_CMD_AB, TEXT, AT(report_frames),
-     .help = "whose pixels report.html holds: a list of first, last,\n"
-             "worst, all, none, frames; default: first,last,worst"},
+     .help = "whose pixels report.html holds: a list of first,\n"
+             "last, worst, all, none, and frames as in --frames;\n"
+             "default: first,last,worst"},
     {"trace", "F.json", RL_CMD_RUN | RL_CMD_AB, TEXT, AT(trace),
      .help = "write what ran when, for ui.perfetto.dev or\n"
              "chrome://tracing"},
