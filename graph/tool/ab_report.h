@@ -26,8 +26,9 @@ typedef struct rl_ab_report {
     size_t n_verdicts;
     const rl_ab_failure *failures;
     size_t n_failures;
-    size_t frames;  /* that were compared */
-    double seconds; /* of the whole run, by the clock */
+    size_t frames;     /* that were compared */
+    double seconds;    /* of the whole run, by the clock */
+    long long started; /* seconds since 1970, UTC; 0: not known */
 } rl_ab_report;
 
 /* "skin", or NULL for RL_AB_WHOLE. */
