@@ -5,11 +5,14 @@
 
 #include "graph/base/file.h"
 #include "graph/tool/ab_json.h"
+#include "graph/tool/ab_junit.h"
 #include "graph/tool/ab_run.h"
+#include "graph/tool/ab_table.h"
+#include "graph/tool/ab_words.h"
 #include "graph/tool/plan_variants.h"
 
 /* Names in --out. */
-static const char metrics_name[] = "metrics.json", page_name[] = "report.html";
+static const char metrics_name[] = "metrics.json", junit_name[] = "junit.xml", page_name[] = "report.html";
 
 /* What is at the end, all in the tool's arena but the results. */
 typedef struct finish {
@@ -39,6 +42,26 @@ static rl_code write_text(const finish *f, const char *name, const rl_str *text)
     return path ? rl_file_write(path, rl_str_text(text), text->length, f->err) : rl_fail_memory(f->err, 64);
 }
 
+static rl_code make_summary(finish *f)
+{
+    rl_str text = {0};
+    rl_code code = rl_ab_words(&f->report, &text, f->err);
+    if (!code && !(f->report.summary = rl_arena_strdup(f->run->tool->arena, rl_str_text(&text))))
+        code = rl_fail_memory(f->err, text.length);
+    rl_str_free(&text);
+    return code;
+}
+
+static rl_code write_junit(const finish *f)
+{
+    rl_str text = {0};
+    rl_code code = rl_ab_junit(&f->report, &text, f->err);
+    if (!code)
+        code = write_text(f, junit_name, &text);
+    rl_str_free(&text);
+    return code;
+}
+
 static rl_code write_metrics(finish *f)
 {
     rl_code code = rl_ab_json(&f->report, &f->metrics, f->err);
@@ -62,6 +85,11 @@ static rl_code print_text(const finish *f)
     rl_experiment_cost_of(r->experiment, &cost);
     if (f->report.summary)
         rl_str_printf(&out, "%s\n", f->report.summary);
+    if (r->frames) {
+        rl_str_add(&out, "\n");
+        rl_ab_table(&f->report, &out);
+        rl_str_add(&out, "\n");
+    }
     rl_ab_fail_print(&f->report, &out);
     rl_cost_sentence(&cost, r->plan.n_variants, &out);
     if (r->plan.n_variants > r->plan.n_listed)
@@ -112,8 +140,10 @@ rl_code rl_ab_finish(rl_ab_run *r, double seconds, size_t *over, rl_error *err)
     if (code)
         return code;
     check_thresholds(&f);
+    make_summary(&f);
     if (!write_metrics(&f))
         write_page(&f);
+    write_junit(&f);
     if (r->sheet)
         rl_ab_sheet_write(r->sheet, r->sheet_path, err);
     if (r->tool->report->json)
