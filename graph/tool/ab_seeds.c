@@ -62,7 +62,9 @@ static rl_code other_seed(rl_arena *arena, const rl_node *node, const rl_param *
 {
     enum { APART = 104729 };
     const char *at = (const char *)node->params + row->offset;
-    double least = row->min > -1e9 ? row->min : -1e9, most = row->max < 2e9 ? row->max : 2e9;
+    /* what holds every integer */
+    double bound = row->type == RL_I32 ? 2147483647.0 : 16777216.0;
+    double least = row->min > -bound ? row->min : -bound, most = row->max < bound ? row->max : bound;
     int32_t integer = 0;
     float number = 0;
     memcpy(&integer, at, sizeof integer);
