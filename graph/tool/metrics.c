@@ -107,33 +107,30 @@ static rl_code check_images(rl_metric metric, const rl_metric_image *a, const rl
     return RL_OK;
 }
 
-rl_code rl_metric_map(rl_metric metric, const rl_metric_image *reference, const rl_metric_image *test,
-                      rl_pool *pool, float *map, rl_error *err)
-{
-    difference_job job = {metric, reference, test, map};
-    rl_code code = check_images(metric, reference, test, err);
-    if (code)
-        return code;
-    switch (metric) {
-    case RL_METRIC_FLIP:
-        return rl_flip_map(reference, test, pool, map, err);
-    case RL_METRIC_HDRFLIP:
-        return rl_hdrflip_map(reference, test, pool, map, err);
-    case RL_METRIC_SSIM:
-        return rl_ssim_map(reference, test, pool, map, err);
-    default:
-        rl_filter_bands(pool, reference->height, difference_row, &job);
-        return RL_OK;
-    }
-}
-
 rl_code rl_metric_maps(rl_metric metric, const rl_metric_image *reference, const rl_metric_image *tests,
                        size_t n, rl_pool *pool, float *const *maps, rl_error *err)
 {
     for (size_t i = 0; i < n; i++)
-        if (rl_metric_map(metric, reference, &tests[i], pool, maps[i], err))
+        if (check_images(metric, reference, &tests[i], err))
             return err->code;
+    if (metric == RL_METRIC_FLIP)
+        return rl_flip_maps(reference, tests, n, pool, maps, err);
+    if (metric == RL_METRIC_HDRFLIP)
+        return rl_hdrflip_maps(reference, tests, n, pool, maps, err);
+    for (size_t i = 0; i < n; i++) {
+        difference_job job = {metric, reference, &tests[i], maps[i]};
+        if (metric != RL_METRIC_SSIM)
+            rl_filter_bands(pool, reference->height, difference_row, &job);
+        else if (rl_ssim_map(reference, &tests[i], pool, maps[i], err))
+            return err->code;
+    }
     return RL_OK;
+}
+
+rl_code rl_metric_map(rl_metric metric, const rl_metric_image *reference, const rl_metric_image *test,
+                      rl_pool *pool, float *map, rl_error *err)
+{
+    return rl_metric_maps(metric, reference, test, 1, pool, &map, err);
 }
 
 /* ---- statistics ---------------------------------------------------------------------------------------- */
