@@ -92,9 +92,9 @@ static rl_code tables(const rl_pass_input *in, rl_arena *arena, rl_tables *out, 
 }
 
 /* Of a picture that is about half skin. */
-static double cost(const void *params)
+static double cost(const void *of)
 {
-    const sss_burley_params *p = params;
+    const sss_burley_params *p = of;
     return 45 + 2.0 * (p->taps > 0 ? p->taps : 30);
 }
 

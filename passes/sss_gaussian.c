@@ -66,9 +66,9 @@ static const rl_step steps[] = {
 };
 
 /* Follows the size of the profile in pixels, which is not known here: of skin, 3 mm at 2 px a mm. */
-static double cost(const void *params)
+static double cost(const void *of)
 {
-    return ((const sss_gaussian_params *)params)->separable ? 500 : 16000;
+    return ((const sss_gaussian_params *)of)->separable ? 500 : 16000;
 }
 
 const rl_pass rl_pass_sss_gaussian = {

@@ -37,9 +37,9 @@ static const rl_step steps[] = {
 };
 
 /* Follows the square of the profile's size in pixels: of skin, 3 mm at 2 px a mm. */
-static double cost(const void *params)
+static double cost(const void *of)
 {
-    (void)params;
+    (void)of;
     return 50000;
 }
 

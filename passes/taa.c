@@ -43,9 +43,9 @@ static double least_share(const void *values)
     return (double)((const taa_params *)values)->blend;
 }
 
-static double cost(const void *params)
+static double cost(const void *of)
 {
-    (void)params;
+    (void)of;
     return 32;
 }
 
