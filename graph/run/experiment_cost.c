@@ -5,8 +5,9 @@
 #include "graph/base/file.h"
 #include "graph/run/experiment_parts.h"
 
-/* In reads or writes of a plane: `relit bench configs/skin.yaml --size 1920x1080`, two threads. */
-enum { DECODE_CHANNEL = 40, ENCODE_EXR_CHANNEL = 120, ENCODE_IMAGE_CHANNEL = 240 };
+/* In reads or writes of a plane: `relit bench configs/skin.yaml --size 1920x1080`, ratios to the conversions
+ * between layouts. */
+enum { DECODE_CHANNEL = 21, ENCODE_EXR_CHANNEL = 42, ENCODE_IMAGE_CHANNEL = 84 };
 
 static double step_weight(const rl_plan *plan, const rl_plan_step *step)
 {
