@@ -93,33 +93,34 @@ static const rl_port ports[] = {
 
 static const rl_step steps[] = {{"lighting", .domain = RL_EVERY_VECTOR}};
 
+/* With three lights; how many there are is not known here. */
+static double cost(const void *p)
+{
+    (void)p;
+    return 26;
+}
+
 static bool stochastic(const void *values, bool march)
 {
     const lighting_params *p = values;
     return march && p->shadow_jitter;
+}
 
-    /* With three lights; how many there are is not known here. */
-    static double cost(const void *p)
-    {
-        (void)p;
-        return 26;
-    }
-
-    const rl_pass rl_pass_lighting = {
-        .name = "lighting",
-        .help = "direct and ambient light: diffuse transmission, specular reflection, translucency",
-        .source = "Golubev 2018; Helix; Walter 2007; Heitz 2014",
-        .kernel = "lighting.cl",
-        .kernel_prelude = "sg.cl surface.cl sg_shade.cl screen_shadow.cl",
-        .params = RL_ARRAY(params),
-        .params_size = sizeof(lighting_params),
-        .profile_keys = RL_ARRAY(profile_keys),
-        .material_keys = RL_ARRAY(material_keys),
-        .shading_keys = RL_ARRAY(shading_keys),
-        .ports = RL_ARRAY(ports),
-        .steps = RL_ARRAY(steps),
-        .lights = true,
-        .ambient = true,
-        .stochastic = stochastic,
-        .cost = cost,
-    };
+const rl_pass rl_pass_lighting = {
+    .name = "lighting",
+    .help = "direct and ambient light: diffuse transmission, specular reflection, translucency",
+    .source = "Golubev 2018; Helix; Walter 2007; Heitz 2014",
+    .kernel = "lighting.cl",
+    .kernel_prelude = "sg.cl surface.cl sg_shade.cl screen_shadow.cl",
+    .params = RL_ARRAY(params),
+    .params_size = sizeof(lighting_params),
+    .profile_keys = RL_ARRAY(profile_keys),
+    .material_keys = RL_ARRAY(material_keys),
+    .shading_keys = RL_ARRAY(shading_keys),
+    .ports = RL_ARRAY(ports),
+    .steps = RL_ARRAY(steps),
+    .lights = true,
+    .ambient = true,
+    .stochastic = stochastic,
+    .cost = cost,
+};

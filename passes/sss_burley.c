@@ -91,32 +91,33 @@ static rl_code tables(const rl_pass_input *in, rl_arena *arena, rl_tables *out, 
     return RL_OK;
 }
 
+/* Of a picture that is about half skin. */
+static double cost(const void *of)
+{
+    const sss_burley_params *p = of;
+    return 45 + 2.0 * (p->taps > 0 ? p->taps : 30);
+}
+
 static bool stochastic(const void *values, bool march)
 {
     const sss_burley_params *p = values;
     (void)march;
     return p->rotation != 0; /* none */
+}
 
-    /* Of a picture that is about half skin. */
-    static double cost(const void *of)
-    {
-        const sss_burley_params *p = of;
-        return 45 + 2.0 * (p->taps > 0 ? p->taps : 30);
-    }
-
-    const rl_pass rl_pass_sss_burley = {
-        .name = "sss_burley",
-        .help = "subsurface scattering with Burley's profile, a few importance-sampled taps a pixel",
-        .source = "Golubev, Efficient screen-space subsurface scattering, SIGGRAPH 2018",
-        .kernel = "sss_burley.cl",
-        .kernel_prelude = "scatter.cl",
-        .params = RL_ARRAY(params),
-        .params_size = sizeof(sss_burley_params),
-        .profile_keys = RL_ARRAY(rl_scatter_profile_rows),
-        .shading_keys = RL_ARRAY(rl_scatter_shading_rows),
-        .ports = RL_ARRAY(ports),
-        .steps = RL_ARRAY(steps),
-        .tables = tables,
-        .stochastic = stochastic,
-        .cost = cost,
-    };
+const rl_pass rl_pass_sss_burley = {
+    .name = "sss_burley",
+    .help = "subsurface scattering with Burley's profile, a few importance-sampled taps a pixel",
+    .source = "Golubev, Efficient screen-space subsurface scattering, SIGGRAPH 2018",
+    .kernel = "sss_burley.cl",
+    .kernel_prelude = "scatter.cl",
+    .params = RL_ARRAY(params),
+    .params_size = sizeof(sss_burley_params),
+    .profile_keys = RL_ARRAY(rl_scatter_profile_rows),
+    .shading_keys = RL_ARRAY(rl_scatter_shading_rows),
+    .ports = RL_ARRAY(ports),
+    .steps = RL_ARRAY(steps),
+    .tables = tables,
+    .stochastic = stochastic,
+    .cost = cost,
+};
