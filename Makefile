@@ -92,7 +92,7 @@ $(BUILD)/relit: $(MAIN_O) $(BUILD)/tool.a $(BUILD)/librelit.a
 
 $(BUILD)/relit_oiio.so: $(MODULE_CXX:%.cc=$(BUILD)/%.o)
 	$(call say,link $@)
-	$(Q)$(CXX) $(LDFLAGS) -shared -o $@ $^ $(shell pkg-config --libs OpenImageIO)
+	$(Q)$(CXX) $(LDFLAGS) -shared -o $@ $^ $(shell pkg-config --libs OpenImageIO fontconfig)
 
 # Texts become arrays: $(call embed,files,name of the table)
 define embed
@@ -118,8 +118,9 @@ $(BUILD)/kernels.o $(BUILD)/page.o: %.o: %.c
 # Loops over every sample of a frame: gcc vectorizes them from -O3 on.
 $(BUILD)/graph/run/ingest.o: OPT += -O3
 
-# Sums over filter taps, the same.
+# Sums over filter taps, the same; and powers of pixels, where errno and traps would keep sqrt and choices from it.
 $(BUILD)/graph/tool/metric_filter.o: OPT += -O3
+$(BUILD)/graph/tool/metric_flip_rows.o: OPT += -O3 -fno-math-errno -fno-trapping-math
 
 # Where `make install` puts things that are looked for at run time; a build tree finds its own first.
 $(BUILD)/graph/run/image_module.o: CPPFLAGS += -DRL_MODULE_DIR='"$(PREFIX)/lib/relit"'
@@ -149,7 +150,7 @@ $(BUILD)/tests/%: $(BUILD)/tests/%.o $(BUILD)/tests/sanitizers.o $(BUILD)/tests/
 	$(Q)$(CC) $(LDFLAGS) -o $@ $^ $(LIBS) -lcmocka
 
 # They load the module; so does whatever writes PNG files.
-$(BUILD)/tests/test_image_file $(BUILD)/tests/test_sg_run $(BUILD)/tests/test_diff: | $(BUILD)/relit_oiio.so
+$(BUILD)/tests/test_image_file $(BUILD)/tests/test_sg_run $(BUILD)/tests/test_diff $(BUILD)/tests/test_ab_sheet $(BUILD)/tests/test_ab: | $(BUILD)/relit_oiio.so
 
 test-build: all $(TESTS) $(BENCHES)
 
@@ -192,7 +193,8 @@ slurm-test: all
 # ---- the rest --------------------------------------------------------------------------------------------------
 
 DEB = build-essential pkg-config libopenexr-dev libopenimageio-dev libopencolorio-dev pocl-opencl-icd ocl-icd-opencl-dev \
-      opencl-headers libyaml-dev libjansson-dev libxxhash-dev libdeflate-dev libisal-dev libcmocka-dev libgraphviz-dev clang-format
+      opencl-headers libyaml-dev libjansson-dev libxxhash-dev libdeflate-dev libisal-dev libcmocka-dev libgraphviz-dev clang-format \
+      libfontconfig-dev fonts-dejavu-core
 
 # Asks for root rights only when something is missing.
 deps:

@@ -93,6 +93,12 @@ static const rl_port ports[] = {
 
 static const rl_step steps[] = {{"lighting", .domain = RL_EVERY_VECTOR}};
 
+static bool stochastic(const void *values, bool march)
+{
+    const lighting_params *p = values;
+    return march && p->shadow_jitter;
+}
+
 const rl_pass rl_pass_lighting = {
     .name = "lighting",
     .help = "direct and ambient light: diffuse transmission, specular reflection, translucency",
@@ -108,4 +114,5 @@ const rl_pass rl_pass_lighting = {
     .steps = RL_ARRAY(steps),
     .lights = true,
     .ambient = true,
+    .stochastic = stochastic,
 };
