@@ -82,7 +82,7 @@ static double write_cost(const rl_experiment *x, size_t capture, const rl_group 
     if (!x->variants[variant].files)
         return 0;
     if (measured)
-        return x->captures[capture].write_ns[variant] / (double)g->frames;
+        return x->captures[capture].write_ns[variant] / (double)x->captures[capture].write_frames;
     for (size_t o = 0; o < s->n_outputs; o++) {
         const rl_graph_output *out = &q->graph->outputs[q->first_output + o];
         bool exr = !strcasecmp(rl_path_extension(s->outputs[o].spec->file), ".exr");
@@ -130,7 +130,7 @@ void rl_experiment_cost_of(const rl_experiment *x, rl_experiment_cost *out)
     bool measured = x->n_captures > 0;
     for (size_t k = 0; k < x->n_captures; k++)
         for (size_t g = 0; g < x->captures[k].n_groups; g++)
-            measured &= x->captures[k].groups[g].frames > 0;
+            measured &= x->captures[k].groups[g].frames > 0 && x->captures[k].write_frames > 0;
     for (size_t k = 0; k < x->n_captures; k++)
         add_capture(x, k, measured, &all, &one, &sum);
     *out = (rl_experiment_cost){
