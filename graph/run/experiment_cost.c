@@ -73,8 +73,7 @@ static double read_cost(const rl_group *g, bool measured)
     return measured ? (g->load_ns + g->step_ns) / (double)g->frames : DECODE_CHANNEL * planes + steps;
 }
 
-static double write_cost(const rl_experiment *x, size_t capture, const rl_group *g, size_t variant,
-                         bool measured)
+static double write_cost(const rl_experiment *x, size_t capture, size_t variant, bool measured)
 {
     const rl_session *s = x->sessions[variant];
     const rl_sequence *q = &s->sequences[capture];
@@ -116,7 +115,7 @@ static void add_capture(const rl_experiment *x, size_t capture, bool measured, d
             *all += any ? cost : 0;
         }
         for (size_t m = 0; m < g->n; m++) {
-            double write = frames * write_cost(x, capture, g, g->members[m], measured);
+            double write = frames * write_cost(x, capture, g->members[m], measured);
             *all += write;
             *sum += write + frames * read;
             *one += g->members[m] == 0 ? write + frames * read : 0;
