@@ -140,7 +140,7 @@ $(BUILD)/tests/%: $(BUILD)/tests/%.o $(BUILD)/tests/sanitizers.o $(BUILD)/tests/
 	$(Q)$(CC) $(LDFLAGS) -o $@ $^ $(LIBS) -lcmocka
 
 # They load the module; so does whatever writes PNG files.
-$(BUILD)/tests/test_image_file $(BUILD)/tests/test_sg_run $(BUILD)/tests/test_diff: | $(BUILD)/relit_oiio.so
+$(BUILD)/tests/test_image_file $(BUILD)/tests/test_sg_run $(BUILD)/tests/test_diff $(BUILD)/tests/test_ab_against: | $(BUILD)/relit_oiio.so
 
 test-build: all $(TESTS) $(BENCHES)
 
