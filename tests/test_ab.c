@@ -444,6 +444,7 @@ static void test_plan(void **state)
     expect_in(r.out, "  4   ");
     expect_in(r.out, "light             lighting    all\n");
     expect_in(r.out, "sss@2             sss_burley  21\n");
+    expect_in(r.out, "output.preview@2  color       21\n"); /* shown, and compared: still one variant's */
     tool_result_free(&r);
     r = PLAN("--format", "json");
     expect(&r, 0);
