@@ -235,7 +235,7 @@ static void test_seeds(void **state)
     }
     assert_string_not_equal(seed_of(2, "graph.sss.seed"), seed_of(3, "graph.sss.seed"));
     assert_string_not_equal(seed_of(2, "graph.sss.seed"), "0"); /* the first one's own */
-    assert_string_equal(plan.variants[2].name, "8.seed2");
+    assert_string_equal(plan.variants[2].name, "taps_8.seed2");
     c.seeds = 1;
     config_assert_fine(make(c));
     assert_int_equal(plan.n_variants, 2);
