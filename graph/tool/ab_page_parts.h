@@ -46,6 +46,8 @@ typedef struct rl_page_lut {
     double knee, first, last; /* scene-linear; what lies outside is moved to the end */
     double low, high;         /* encoded values */
     uint16_t *entries;        /* [3 · n³], owned */
+    uint8_t *packed;          /* the same as a block, owned */
+    size_t size;
     /* |table - display|, both clamped to 0 … 1, over pixels that were compared. */
     double error_max, error_sum;
     unsigned long long pixels;

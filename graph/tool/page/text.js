@@ -30,7 +30,7 @@ function number(x, digits = 3) {
   const size = Math.abs(x);
   let text;
   if (size === 0) text = "0";
-  else if (size >= 1e6 || size < 1e-4) text = x.toExponential(digits - 1).replace("e+", "e");
+  else if (size >= 1e6 || size < 1e-4) text = x.toExponential(Math.min(digits - 1, 1)).replace("e+", "e");
   else text = x.toFixed(clamp(digits - 1 - Math.floor(Math.log10(size)), 0, 8));
   return text.replace(/-/g, MINUS);
 }
