@@ -508,6 +508,9 @@ def light_and_dark(p):
 def phone(p):
     """360 pixels wide: nothing sticks out, controls are large enough, all of it works."""
     p.b.size(360, 740, 2, True)
+    p.open("evil.html")  # long names
+    width = p.b.js("return [document.documentElement.scrollWidth, innerWidth]")
+    check(width == [360, 360], f"the page with long names is {width} wide")
     p.open()
     over = p.b.js("""const w = document.documentElement.clientWidth; if (document.documentElement.scrollWidth <= w) return [];
         return [...document.querySelectorAll('body *')].filter(e => e.getBoundingClientRect().right > w + 1 && !e.closest('.scroll, nav')).map(e => e.tagName + '.' + e.className).slice(0, 5)""")

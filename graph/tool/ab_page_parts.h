@@ -107,6 +107,7 @@ rl_code rl_page_spool_read(const rl_page_spool *spool, off_t at, void *data, siz
 typedef struct rl_page_held {
     size_t seen; /* the frame: index into page->seen */
     unsigned why;
+    bool encoded; /* the reference has no scene-linear image: it was decoded from sRGB */
     rl_page_extent extent;
     /* An image a variant, the reference, the ids of the materials, then for each pair its maps. */
     rl_page_block *blocks; /* owned; size 0: absent */

@@ -86,7 +86,7 @@ static void add_held(const writer *w, rl_str *s, const rl_page_held *held, size_
     }
     rl_str_add(s, "],\"reference\":");
     add_block(s, &b[listed], id + listed);
-    rl_str_add(s, ",\"ids\":");
+    rl_str_printf(s, ",\"encoded\":%s,\"ids\":", held->encoded ? "true" : "false");
     add_block(s, &b[listed + 1], id + listed + 1);
     rl_str_add(s, ",\"maps\":[");
     for (size_t i = listed + 2; i < held->n_blocks; i++) {
@@ -272,7 +272,7 @@ static void put_title(const writer *w)
     enum { MOST = 4 };
     size_t n = w->page->plan->n_listed, named = n > MOST ? MOST - 1 : n;
     for (size_t v = 0; v < named; v++) {
-        put(w, v ? " · " : "");
+        put(w, v ? "\xc2\xa0· " : "");
         put_html(w, w->page->plan->variants[v].name);
     }
     if (named < n)

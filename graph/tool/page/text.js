@@ -38,7 +38,7 @@ function number(x, digits = 3) {
 /* A fixed number of decimals, for columns of pixels. */
 const fixed = (x, n) => (x === null || !Number.isFinite(x) ? NONE : x.toFixed(n).replace("-", MINUS));
 
-const METRIC_NAMES = {flip: "FLIP", hdrflip: "HDR-FLIP", psnr: "PSNR", ssim: "SSIM", rmse: "RMSE", max: "Max"};
+const METRIC_NAMES = {flip: "FLIP", hdrflip: "HDR-FLIP", psnr: "PSNR", ssim: "SSIM", rmse: "RMSE", max: "Max diff"};
 const METRIC_UNITS = {psnr: "dB"};
 const METRIC_HELP = {
   flip: "perceived difference of the display images, 0 to 1 (Andersson et al. 2020)",

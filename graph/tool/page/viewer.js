@@ -8,8 +8,8 @@ const MODES = [
 const EXPOSURES = {low: -8, high: 8, step: 0.25};
 const ZOOMS = {low: 1 / 16, high: 64};
 
-/* Beyond 1, a pixel of the picture is a square of whole pixels. */
-const wholeScale = scale => (scale > 1 ? Math.floor(scale + 1e-6) : scale);
+/* Beyond 1, a pixel of the picture is a square of whole pixels; between 1 and 2 only where they are not fine. */
+const wholeScale = (scale, ratio) => (scale >= 2 || (scale > 1 && ratio < 2) ? Math.floor(scale + 1e-6) : scale);
 
 /* The pair that differs most by FLIP, in a frame (all frames when that is undefined): its index. */
 function worstPair(metrics, frame) {
@@ -187,7 +187,7 @@ class Viewer {
       const metric = st.overlay === "flip" || st.overlay === "hdrflip" ? st.overlay : null;
       const blocks = [...sides, this.frame.ids, this.mapBlock("flip"), this.mapBlock("hdrflip")];
       const [a, b, ids, flip, hdrflip] = await Promise.all(blocks.map(x => x && loadBlock(x)));
-      const displays = await Promise.all([st.a, st.b].map(v => displayFor(this.page, st.display, v)));
+      const displays = await Promise.all([st.a, st.b].map(v => displayFor(this.page, this.frame, st.display, v)));
       if (ticket !== this.ticket) return;
       const resized = !this.loaded || this.loaded.pictures[0].image.width !== a.width ||
                       this.loaded.pictures[0].image.height !== a.height;
@@ -216,7 +216,7 @@ class Viewer {
     if (!this.loaded) return;
     const image = this.loaded.pictures[0].image, ratio = window.devicePixelRatio || 1;
     const width = this.stage.clientWidth, most = Math.max(240, window.innerHeight * 0.74);
-    const scale = wholeScale(Math.min(width * ratio / image.width, most * ratio / image.height));
+    const scale = wholeScale(Math.min(width * ratio / image.width, most * ratio / image.height), ratio);
     const height = Math.round(clamp(scale * image.height / ratio, 160, most));
     this.stage.style.height = height + "px";
     this.canvas.width = Math.round(width * ratio);
@@ -229,7 +229,7 @@ class Viewer {
 
   fit() {
     const image = this.loaded.pictures[0].image;
-    const scale = wholeScale(Math.min(this.paneWidth() / image.width, this.canvas.height / image.height));
+    const scale = wholeScale(Math.min(this.paneWidth() / image.width, this.canvas.height / image.height), window.devicePixelRatio || 1);
     this.state = {...this.state, scale: Math.max(scale, ZOOMS.low), centre: [image.width / 2, image.height / 2], fit: true};
     this.draw();
   }
