@@ -93,6 +93,13 @@ static const rl_port ports[] = {
 
 static const rl_step steps[] = {{"lighting", .domain = RL_EVERY_VECTOR}};
 
+/* With three lights; how many there are is not known here. */
+static double cost(const void *p)
+{
+    (void)p;
+    return 26;
+}
+
 static bool stochastic(const void *values, bool march)
 {
     const lighting_params *p = values;
@@ -115,4 +122,5 @@ const rl_pass rl_pass_lighting = {
     .lights = true,
     .ambient = true,
     .stochastic = stochastic,
+    .cost = cost,
 };

@@ -91,6 +91,13 @@ static rl_code tables(const rl_pass_input *in, rl_arena *arena, rl_tables *out, 
     return RL_OK;
 }
 
+/* Of a picture that is about half skin. */
+static double cost(const void *of)
+{
+    const sss_burley_params *p = of;
+    return 45 + 2.0 * (p->taps > 0 ? p->taps : 30);
+}
+
 static bool stochastic(const void *values, bool march)
 {
     const sss_burley_params *p = values;
@@ -112,4 +119,5 @@ const rl_pass rl_pass_sss_burley = {
     .steps = RL_ARRAY(steps),
     .tables = tables,
     .stochastic = stochastic,
+    .cost = cost,
 };
