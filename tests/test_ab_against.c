@@ -351,10 +351,14 @@ static void test_folder(void **state)
     assert_true(before > 0);
     e->frame.frame = 2;
     e->frame.index = 1;
-    char *second = write_exr("monkey.post.0002.exr", NULL);
-    assert_int_equal(measure_more(m, &r, &err), RL_E_IO);
-    remove(second);
-    free(second);
+    char *second[] = {write_exr("monkey.post.0002.exr", NULL), NULL};
+    pixels[0][3] = NAN;
+    second[1] = write_exr("monkey.pre_post.0002.exr", NULL);
+    assert_int_equal(measure_more(m, &r, &err), RL_E_DATA);
+    for (int i = 0; i < 2; i++) {
+        remove(second[i]);
+        free(second[i]);
+    }
     err = (rl_error){0};
     assert_int_equal(rl_ab_measure_results(m, &r, &err), RL_OK);
     assert_int_equal(r.n_values, before);
