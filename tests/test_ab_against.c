@@ -345,6 +345,27 @@ static void test_folder(void **state)
     assert_true(fabs(most(&r, 1) - 0.5) < 1e-6);
     assert_null(value_of(&r, 0, RL_METRIC_FLIP));
     rl_ab_measure_free(&m);
+    /* The second pair fails: the first one's values of this frame are none either. */
+    m = measure(folder, &r, &err);
+    size_t before = r.n_values;
+    assert_true(before > 0);
+    e->frame.frame = 2;
+    e->frame.index = 1;
+    char *second[] = {write_exr("monkey.post.0002.exr", NULL), NULL};
+    pixels[0][3] = NAN;
+    second[1] = write_exr("monkey.pre_post.0002.exr", NULL);
+    assert_int_equal(measure_more(m, &r, &err), RL_E_DATA);
+    for (int i = 0; i < 2; i++) {
+        remove(second[i]);
+        free(second[i]);
+    }
+    err = (rl_error){0};
+    assert_int_equal(rl_ab_measure_results(m, &r, &err), RL_OK);
+    assert_int_equal(r.n_values, before);
+    assert_null(rl_ab_measure_map(m, 0, RL_METRIC_MAX));
+    e->frame.frame = 1;
+    e->frame.index = 0;
+    rl_ab_measure_free(&m);
     /* The display's, when it is there; the same file for both, read once. */
     draw(RL_COMPARED_DISPLAY, NULL);
     free(write_png("monkey.0001.png"));
