@@ -492,7 +492,8 @@ static void test_plan(void **state)
     expect_in(r.out, "  taps_4   ");
     expect_in(r.out, "light             lighting    all\n");
     expect_in(r.out, "sss@2             sss_burley  taps_21\n");
-    expect_in(r.out, "output.preview@2  color       taps_21\n"); /* shown, and compared: still one variant's */
+    expect_in(r.out,
+              "output.preview@2  color       taps_21\n"); /* shown, and compared: still one variant's */
     tool_result_free(&r);
     r = PLAN("--format", "json");
     expect(&r, 0);
