@@ -231,40 +231,11 @@ static rl_code put_blocks(const writer *w, rl_error *err)
 
 /* ---- the page ------------------------------------------------------------------------------------------ */
 
-static const char *source(const char *name)
-{
-    for (const rl_embedded_text *e = rl_embedded_page; e->name; e++)
-        if (!strcmp(e->name, name))
-            return (const char *)e->text;
-    return "";
-}
-
-static void put_scripts(const writer *w)
-{
-    for (const rl_embedded_text *e = rl_embedded_page; e->name; e++)
-        if (!strcmp(rl_path_extension(e->name), ".js"))
-            put(w, (const char *)e->text);
-}
-
 static void put_html(const writer *w, const char *text)
 {
     rl_str s = {0};
     rl_page_html_text(&s, text);
     put_text(w, &s);
-}
-
-/* In JSON, '<' is in strings only: "</script>" and "<!--" cannot end or change the element around it. */
-static void put_metrics(const writer *w)
-{
-    for (const char *at = w->metrics_text; *at;) {
-        size_t n = strcspn(at, "<");
-        fwrite(at, 1, n, w->file);
-        at += n;
-        if (*at) {
-            put(w, "\\u003c");
-            at++;
-        }
-    }
 }
 
 static void put_title(const writer *w)
@@ -279,41 +250,36 @@ static void put_title(const writer *w)
         fprintf(w->file, " and %zu more", n - named);
 }
 
-static rl_code put_part(const writer *w, const char *name, size_t n, rl_error *err)
+static const char *const scripts[] = {"text.js",     "decode.js",  "display.js", "look.js",
+                                      "look_gl.js",  "look_2d.js", "viewer.js",  "viewer_input.js",
+                                      "readout.js",  "plot.js",    "tables.js",  "graph.js",
+                                      "sections.js", "main.js",    NULL};
+
+static void put_n(void *ctx, const char *text, size_t n)
 {
+    fwrite(text, 1, n, ((const writer *)ctx)->file);
+}
+
+static rl_code put_part(void *ctx, const char *name, size_t n, rl_error *err)
+{
+    const writer *w = ctx;
+    const rl_page_maker maker = {put_n, NULL, ctx};
     const char *summary = json_string_value(json_object_get(w->metrics, "summary"));
     if (!strncmp(name, "title", n))
         put_title(w);
     else if (!strncmp(name, "style", n))
-        put(w, source("page.css"));
+        put(w, rl_page_source("page.css"));
     else if (!strncmp(name, "summary", n))
         put_html(w, summary ? summary : "");
     else if (!strncmp(name, "metrics", n))
-        put_metrics(w);
+        rl_page_put_json(&maker, w->metrics_text);
     else if (!strncmp(name, "page", n))
         put_page(w);
     else if (!strncmp(name, "script", n))
-        put_scripts(w);
+        rl_page_put_scripts(&maker, scripts);
     else if (!strncmp(name, "blocks", n))
         return put_blocks(w, err);
     return RL_OK;
-}
-
-/* Places in page.html are written {{name}}. */
-static rl_code put_all(const writer *w, rl_error *err)
-{
-    rl_code code = RL_OK;
-    for (const char *at = source("page.html"); at && !code;) {
-        const char *open = strstr(at, "{{"), *close = open ? strstr(open, "}}") : NULL;
-        if (!close) {
-            put(w, at);
-            break;
-        }
-        fwrite(at, 1, (size_t)(open - at), w->file);
-        code = put_part(w, open + 2, (size_t)(close - open - 2), err);
-        at = close + 2;
-    }
-    return code;
 }
 
 static rl_code write_file(writer *w, const char *path, unsigned long long *bytes, rl_error *err)
@@ -327,7 +293,8 @@ static rl_code write_file(writer *w, const char *path, unsigned long long *bytes
     w->file = fopen(temp, "wbe");
     if (!w->file)
         return rl_fail_file(err, RL_E_IO, path, "cannot be written: %s", strerror(errno));
-    code = put_all(w, err);
+    const rl_page_maker maker = {put_n, put_part, w};
+    code = rl_page_expand("page.html", &maker, err);
     long size = ftell(w->file);
     bool bad = ferror(w->file) || size < 0;
     bad |= fclose(w->file) != 0;
@@ -345,9 +312,10 @@ static rl_code write_file(writer *w, const char *path, unsigned long long *bytes
 /* What is in the page besides frames, a little more than less. */
 static unsigned long long fixed_bytes(const rl_ab_page *page, const char *metrics)
 {
-    unsigned long long bytes = strlen(metrics) + 4096;
-    for (const rl_embedded_text *e = rl_embedded_page; e->name; e++)
-        bytes += strlen((const char *)e->text);
+    unsigned long long bytes =
+        strlen(metrics) + strlen(rl_page_source("page.html")) + strlen(rl_page_source("page.css")) + 8192;
+    for (const char *const *name = scripts; *name; name++)
+        bytes += strlen(rl_page_source(*name));
     for (size_t i = 0; i < page->source->n_displays; i++)
         bytes += rl_page_base64_size(page->luts[i].size) + 256;
     for (size_t i = 0; i < page->n_seen; i++)

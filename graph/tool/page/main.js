@@ -9,13 +9,6 @@ function openHelp() {
   dialog.showModal();
 }
 
-/* The system's choice until somebody chooses. */
-function switchTheme() {
-  const root = document.documentElement, dark = root.dataset.theme ? root.dataset.theme === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
-  root.dataset.theme = dark ? "light" : "dark";
-  byId("theme").setAttribute("aria-label", `Theme: ${root.dataset.theme}`);
-}
-
 function facts(metrics, page) {
   const captures = metrics.captures || [], over = (metrics.thresholds || []).reduce((n, t) => n + (t.over || []).length, 0);
   const failed = page.frames.filter(f => f.error).length, cost = metrics.cost, list = [];
