@@ -64,6 +64,7 @@ typedef struct rl_page_block {
     off_t at; /* in the spool */
     size_t size;
     int bits, planes, width, height;
+    bool based; /* the frame's first block has to be added, modulo 2^bits */
 } rl_page_block;
 
 typedef struct rl_page_seen {

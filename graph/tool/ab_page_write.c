@@ -41,13 +41,18 @@ static void put_number(rl_str *s, double value)
 
 /* ---- what the page is told besides metrics.json -------------------------------------------------------- */
 
-static void add_block(rl_str *s, const rl_page_block *b, size_t id)
+static void add_block(rl_str *s, const rl_page_held *held, size_t i, size_t first)
 {
-    if (b->size)
-        rl_str_printf(s, "{\"id\":%zu,\"bits\":%d,\"planes\":%d,\"width\":%d,\"height\":%d}", id, b->bits,
-                      b->planes, b->width, b->height);
-    else
+    const rl_page_block *b = &held->blocks[i];
+    if (!b->size) {
         rl_str_add(s, "null");
+        return;
+    }
+    rl_str_printf(s, "{\"id\":%zu,\"bits\":%d,\"planes\":%d,\"width\":%d,\"height\":%d", first + i, b->bits,
+                  b->planes, b->width, b->height);
+    if (b->based)
+        rl_str_printf(s, ",\"base\":%zu", first);
+    rl_str_add(s, "}");
 }
 
 static void add_why(rl_str *s, unsigned why)
@@ -76,24 +81,23 @@ static void add_held(const writer *w, rl_str *s, const rl_page_held *held, size_
 {
     const rl_ab_page *page = w->page;
     size_t listed = page->plan->n_listed;
-    const rl_page_block *b = held->blocks;
     rl_str_add(s, ",\"why\":");
     add_why(s, held->why);
     rl_str_add(s, ",\"images\":[");
     for (size_t v = 0; v < listed; v++) {
         rl_str_add(s, v ? "," : "");
-        add_block(s, &b[v], id + v);
+        add_block(s, held, v, id);
     }
     rl_str_add(s, "],\"reference\":");
-    add_block(s, &b[listed], id + listed);
+    add_block(s, held, listed, id);
     rl_str_printf(s, ",\"encoded\":%s,\"ids\":", held->encoded ? "true" : "false");
-    add_block(s, &b[listed + 1], id + listed + 1);
+    add_block(s, held, listed + 1, id);
     rl_str_add(s, ",\"maps\":[");
     for (size_t i = listed + 2; i < held->n_blocks; i++) {
         size_t k = i - listed - 2;
         rl_str_printf(s, "%s{\"pair\":%zu,\"metric\":\"%s\",\"block\":", k ? "," : "", k / RL_PAGE_MAPS,
                       rl_metric_name(rl_page_maps[k % RL_PAGE_MAPS]));
-        add_block(s, &b[i], id + i);
+        add_block(s, held, i, id);
         rl_str_add(s, "}");
     }
     rl_str_add(s, "]");

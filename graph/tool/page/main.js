@@ -4,7 +4,7 @@ function openHelp() {
   const dialog = byId("help");
   if (!dialog.childElementCount)
     dialog.append(h("h2", {id: "help-title"}, "Keyboard"),
-      h("dl", {class: "keys"}, KEYS.map(([keys, what]) => [h("dt", {}, keys.split(/ (?=\S$)|(?<=^\S) /).map(k => h("kbd", {}, k))), h("dd", {}, what)])),
+      h("dl", {class: "keys"}, KEYS.map(([keys, what]) => [h("dt", {}, keys.map(k => h("kbd", {}, k))), h("dd", {}, what)])),
       h("form", {method: "dialog"}, h("button", {autofocus: true}, "Close")));
   dialog.showModal();
 }
