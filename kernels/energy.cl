@@ -1,6 +1,16 @@
 /* The ledger of energy (graph/run/energy.h), behind common.cl: what a pass adds up when somebody asks for its sums.
  * Nothing of it is in the program otherwise. A step over RL_EVERY_BAND goes through the vectors of a band in order and
  * posts what their lanes have, a material at a time; sums are of two floats (Knuth's two-sum), 48 bits together. */
+#ifndef WANTS_energy
+#define WANTS_energy 0
+#endif
+
+#if WANTS_energy
+#define ENERGY_PORT global float *energy,
+#else
+#define ENERGY_PORT
+#endif
+
 #if WANTS_energy
 
 typedef struct band_t {
