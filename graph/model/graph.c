@@ -171,7 +171,7 @@ static rl_code add_node(rl_graph_builder *b, const rl_node *node)
     for (size_t p = 0; p < n_ports && code == RL_OK; p++) {
         const rl_port *port = &node->pass->ports.rows[p];
         bound[p] = -1;
-        if (port->role != RL_WRITE && port->role != RL_REDUCTION)
+        if (!rl_port_makes(port))
             continue;
         bound[p] = (int)b->n_images;
         code = add_image(b, node->name, port->name,

@@ -187,6 +187,12 @@ typedef struct rl_port {
     bool any_layout;  /* WRITE: the kernel stores through RL_STORE, so the plan may choose (LAYOUT_NAME) */
 } rl_port;
 
+/* Whether a port makes an image of the graph. */
+static inline bool rl_port_makes(const rl_port *port)
+{
+    return port->role == RL_WRITE || port->role == RL_REDUCTION;
+}
+
 /* Ports that nobody asked for, as others have none, are no arguments of the kernels. */
 static inline bool rl_port_on_request(const rl_port *port)
 {
@@ -255,6 +261,9 @@ typedef struct rl_pass {
      * holds elsewhere. */
     double (*least_share)(const void *params);
     const char *fades_where;
+    /* What the arithmetic of a pixel costs, as so many reads or writes of a plane: a rough figure from `relit
+     * bench`, for predictions. NULL: next to nothing. `params` is the pass's struct. */
+    double (*cost)(const void *params);
     bool conserves; /* what its ledger (graph/run/energy.h) says to come out should be what goes in */
 } rl_pass;
 

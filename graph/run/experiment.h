@@ -12,6 +12,7 @@
 
 #include "graph/model/plan.h"
 #include "graph/relit.h"
+#include "graph/run/energy.h"
 #include "graph/run/sink.h"
 
 #ifdef __cplusplus
@@ -58,13 +59,16 @@ typedef struct rl_merged_node {
     size_t n_used;    /* how many */
     uint64_t hash;    /* of its content; the same from run to run */
     double ms;        /* on the device a frame, mean of the frames that ran; < 0 before */
-    double bytes;     /* that its steps read and write a pixel: a model of its cost before it ran */
+    double weight;    /* a model of that before it ran: planes of the frame that its steps read and write, and
+                         what its arithmetic takes in the same unit (rl_pass.cost) */
 } rl_merged_node;
 /* The i-th of a capture, groups one after the other; false when there is none. */
 bool rl_experiment_node(const rl_experiment *experiment, size_t capture, size_t i, rl_merged_node *out);
 
-/* What a run costs against variant `base` alone. The stages' share is their time when frames ran, else the
- * device's alone from the bytes that the steps move. */
+/* What a run costs against a run of variant 0 alone: reading, kernels and writing added up as if they did not
+ * overlap, without what comparing takes. From the times that frames took when some ran, else from a model:
+ * the weights of the nodes, and what a channel takes to decode and to encode (measured once, on one machine:
+ * good for a third). */
 typedef struct rl_experiment_cost {
     double factor; /* this run ÷ one run of variant 0 */
     double sum;    /* all variants one after the other ÷ one run of variant 0 */
@@ -99,6 +103,10 @@ typedef struct rl_experiment_frame {
     const rl_compared_image (*images)[RL_COMPARED]; /* [variants] */
     const char *const *const *files;                /* [variants][n_files[v]]: what was written */
     const size_t *n_files;
+    const rl_energy_row *energy; /* [n_energy] with options.energy, else none: of each variant the live nodes
+                                    that keep a ledger, in order of execution. Materials are those of
+                                    rl_experiment_materials */
+    size_t n_energy;
     size_t done, total;
 } rl_experiment_frame;
 

@@ -43,6 +43,12 @@ static rl_code read_pipeline(rl_session *s, rl_error *err)
 
 rl_code rl_session_open(const rl_options *options, rl_session **out, rl_error *err)
 {
+    return rl_session_open_variant(options, NULL, out, err);
+}
+
+rl_code rl_session_open_variant(const rl_options *options, const char *variant, rl_session **out,
+                                rl_error *err)
+{
     rl_error local = {0};
     err = err ? err : &local;
     *out = NULL;
@@ -51,6 +57,7 @@ rl_code rl_session_open(const rl_options *options, rl_session **out, rl_error *e
         return rl_fail_memory(err, sizeof *s);
     s->options = *options;
     s->log = options->log;
+    s->variant = variant;
     long cpus = sysconf(_SC_NPROCESSORS_ONLN);
     s->threads = options->threads > 0 ? options->threads : cpus > 0 ? (int)cpus : 1;
     rl_code code = rl_pool_new(s->threads, &s->pool, err);
@@ -58,6 +65,8 @@ rl_code rl_session_open(const rl_options *options, rl_session **out, rl_error *e
         code = read_pipeline(s, err);
     if (!code)
         code = rl_session_colors(s, err);
+    if (!code && variant)
+        code = rl_session_compared(s, err);
     if (!code)
         code = rl_session_ambient(s, err);
     if (!code)
