@@ -108,8 +108,9 @@ $(BUILD)/kernels.o: $(BUILD)/kernels.c
 # Loops over every sample of a frame: gcc vectorizes them from -O3 on.
 $(BUILD)/graph/run/ingest.o: OPT += -O3
 
-# Sums over filter taps, the same.
+# Sums over filter taps, the same; and powers of pixels, where errno and traps would keep sqrt and choices from it.
 $(BUILD)/graph/tool/metric_filter.o: OPT += -O3
+$(BUILD)/graph/tool/metric_flip_rows.o: OPT += -O3 -fno-math-errno -fno-trapping-math
 
 # Where `make install` puts things that are looked for at run time; a build tree finds its own first.
 $(BUILD)/graph/run/image_module.o: CPPFLAGS += -DRL_MODULE_DIR='"$(PREFIX)/lib/relit"'

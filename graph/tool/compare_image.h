@@ -13,6 +13,9 @@ typedef struct rl_compare_image {
     bool data;          /* neither RGB nor a single channel, such as a normal: colour metrics do not apply */
     char channels[160]; /* "R G B" */
     bool rec709;        /* false: the file has chromaticities, and they are others */
+    bool has_xy;        /* the file has chromaticities: */
+    double xy[8];       /* x, y of red, green, blue, white */
+    char space[64];     /* relit:colorspace, or "" */
 } rl_compare_image;
 
 /* 8 and 16 bits an sample are taken as sRGB-encoded, half, float and uint as linear. Errors name the file:
