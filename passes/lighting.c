@@ -97,6 +97,12 @@ static const rl_step steps[] = {
     {"lighting_energy", .domain = RL_EVERY_BAND, .with = "energy"},
 };
 
+static bool stochastic(const void *values, bool march)
+{
+    const lighting_params *p = values;
+    return march && p->shadow_jitter;
+}
+
 const rl_pass rl_pass_lighting = {
     .name = "lighting",
     .help = "direct and ambient light: diffuse transmission, specular reflection, translucency",
@@ -112,4 +118,5 @@ const rl_pass rl_pass_lighting = {
     .steps = RL_ARRAY(steps),
     .lights = true,
     .ambient = true,
+    .stochastic = stochastic,
 };

@@ -93,6 +93,13 @@ static rl_code tables(const rl_pass_input *in, rl_arena *arena, rl_tables *out, 
     return RL_OK;
 }
 
+static bool stochastic(const void *values, bool march)
+{
+    const sss_burley_params *p = values;
+    (void)march;
+    return p->rotation != 0; /* none */
+}
+
 const rl_pass rl_pass_sss_burley = {
     .name = "sss_burley",
     .help = "subsurface scattering with Burley's profile, a few importance-sampled taps a pixel",
@@ -107,4 +114,5 @@ const rl_pass rl_pass_sss_burley = {
     .steps = RL_ARRAY(steps),
     .tables = tables,
     .conserves = true,
+    .stochastic = stochastic,
 };

@@ -261,6 +261,9 @@ typedef struct rl_pass {
      * holds elsewhere. */
     double (*least_share)(const void *params);
     const char *fades_where;
+    /* Passes with a parameter `seed`: whether the result depends on it; `march`: some light has `shadow:
+     * screen`. NULL: it always does. */
+    bool (*stochastic)(const void *params, bool march);
     /* What the arithmetic of a pixel costs, as so many reads or writes of a plane: a rough figure from `relit
      * bench`, for predictions. NULL: next to nothing. `params` is the pass's struct. */
     double (*cost)(const void *params);

@@ -1,6 +1,8 @@
 /* `relit plan`: the plan of each capture, as text, graphviz, drawn, or JSON. */
 #include <string.h>
 
+#include "graph/tool/ab_open.h"
+#include "graph/tool/plan_variants.h"
 #include "graph/tool/shard.h"
 #include "graph/tool/svg.h"
 #include "graph/tool/tool.h"
@@ -25,6 +27,27 @@ static rl_code print_capture(const rl_session *session, size_t capture, rl_plan_
     return code;
 }
 
+/* Several pipelines, or several values: what their runs would share. */
+static int plan_variants(rl_tool *tool, rl_plan_word word, rl_error *err)
+{
+    rl_arguments args = tool->args;
+    rl_ab_plan plan;
+    rl_experiment *experiment = NULL;
+    rl_str text = {0};
+    int status = RL_EXIT_WRONG;
+
+    args.seeds = 1; /* `relit ab` adds runs with other seeds; these are not variants */
+    if (rl_ab_plan_make(tool->arena, &args, &tool->report->log, &plan, err) ||
+        rl_ab_open(&plan, &tool->args.run, &experiment, err) ||
+        rl_plan_variants_print(&plan, experiment, word, &text, err))
+        goto done;
+    status = rl_tool_print(tool, &text, err);
+done:
+    rl_str_free(&text);
+    rl_experiment_close(&experiment);
+    return status;
+}
+
 /* Text: one after the other. JSON: an object a line and capture. A drawing is one file: of the first. */
 int rl_cmd_plan(rl_tool *tool, rl_error *err)
 {
@@ -37,6 +60,8 @@ int rl_cmd_plan(rl_tool *tool, rl_error *err)
         rl_fail_file(err, RL_E_USAGE, "relit plan", "--json and --format exclude each other");
         goto done;
     }
+    if (tool->args.n_operands > 1 || tool->args.n_vary)
+        return plan_variants(tool, word, err);
     if (rl_session_open(&tool->args.run, &session, err))
         goto done;
     size_t n = rl_session_captures(session);

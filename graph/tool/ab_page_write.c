@@ -1,0 +1,404 @@
+/* report.html: the sources of the page with the data in their places. */
+#include <errno.h>
+#include <jansson.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "graph/base/alloc.h"
+#include "graph/base/file.h"
+#include "graph/tool/ab_page_parts.h"
+#include "graph/tool/heatmap.h"
+
+/* Where the file goes; the first error of the stream stays in it. */
+typedef struct writer {
+    FILE *file;
+    rl_ab_page *page;
+    json_t *metrics;
+    const char *metrics_text;
+    const rl_page_held **order; /* as the page lists them */
+} writer;
+
+static void put(const writer *w, const char *text)
+{
+    fputs(text, w->file);
+}
+
+static void put_number(rl_str *s, double value)
+{
+    char text[32];
+    rl_str_add(s, isfinite(value) ? rl_format_double(value, text) : "null");
+}
+
+/* ---- what the page is told besides metrics.json -------------------------------------------------------- */
+
+static void add_block(rl_str *s, const rl_page_block *b, size_t id)
+{
+    if (b->size)
+        rl_str_printf(s, "{\"id\":%zu,\"bits\":%d,\"planes\":%d,\"width\":%d,\"height\":%d}", id, b->bits,
+                      b->planes, b->width, b->height);
+    else
+        rl_str_add(s, "null");
+}
+
+static void add_why(rl_str *s, unsigned why)
+{
+    const char *between = "";
+    rl_str_add(s, "[");
+    for (unsigned m = 0; m < RL_METRICS; m++)
+        if (why & 1u << m) {
+            rl_str_printf(s, "%s\"worst %s\"", between, rl_metric_name((rl_metric)m));
+            between = ",";
+        }
+    static const struct {
+        unsigned bit;
+        const char *name;
+    } others[] = {{RL_PAGE_FIRST, "first"}, {RL_PAGE_LAST, "last"}, {RL_PAGE_ASKED, "chosen"}};
+    for (size_t i = 0; i < sizeof others / sizeof *others; i++)
+        if (why & others[i].bit) {
+            rl_str_printf(s, "%s\"%s\"", between, others[i].name);
+            between = ",";
+        }
+    rl_str_add(s, "]");
+}
+
+/* Ids of blocks count through the page: the tables of the displays come first. */
+static void add_held(const writer *w, rl_str *s, const rl_page_held *held, size_t id)
+{
+    const rl_ab_page *page = w->page;
+    size_t listed = page->plan->n_listed;
+    const rl_page_block *b = held->blocks;
+    rl_str_add(s, ",\"why\":");
+    add_why(s, held->why);
+    rl_str_add(s, ",\"images\":[");
+    for (size_t v = 0; v < listed; v++) {
+        rl_str_add(s, v ? "," : "");
+        add_block(s, &b[v], id + v);
+    }
+    rl_str_add(s, "],\"reference\":");
+    add_block(s, &b[listed], id + listed);
+    rl_str_add(s, ",\"ids\":");
+    add_block(s, &b[listed + 1], id + listed + 1);
+    rl_str_add(s, ",\"maps\":[");
+    for (size_t i = listed + 2; i < held->n_blocks; i++) {
+        size_t k = i - listed - 2;
+        rl_str_printf(s, "%s{\"pair\":%zu,\"metric\":\"%s\",\"block\":", k ? "," : "", k / RL_PAGE_MAPS,
+                      rl_metric_name(rl_page_maps[k % RL_PAGE_MAPS]));
+        add_block(s, &b[i], id + i);
+        rl_str_add(s, "}");
+    }
+    rl_str_add(s, "]");
+}
+
+static void add_frames(const writer *w, rl_str *s)
+{
+    const rl_ab_page *page = w->page;
+    size_t id = page->source->n_displays;
+    rl_str_add(s, ",\"frames\":[");
+    for (size_t i = 0; i < page->n_seen; i++) {
+        const rl_page_seen *seen = &page->seen[i];
+        rl_str_printf(s, "%s\n{\"capture\":%zu,\"index\":%zu,\"frame\":%lld", i ? "," : "", seen->capture,
+                      seen->index, seen->frame);
+        if (seen->error.length) {
+            rl_str_add(s, ",\"error\":");
+            rl_page_json_text(s, seen->error.text);
+        } else {
+            rl_str_printf(s, ",\"x\":%d,\"y\":%d,\"width\":%d,\"height\":%d,\"files\":%s", seen->x, seen->y,
+                          seen->width, seen->height, rl_str_text(&seen->files));
+        }
+        const rl_page_held *held = w->order[i];
+        if (held) {
+            add_held(w, s, held, id);
+            id += held->n_blocks;
+        }
+        rl_str_add(s, "}");
+    }
+    rl_str_add(s, "]");
+}
+
+static void add_displays(const rl_ab_page *page, rl_str *s)
+{
+    rl_str_add(s, "\"displays\":[");
+    for (size_t i = 0; i < page->source->n_displays; i++) {
+        const rl_page_lut *l = &page->luts[i];
+        rl_str_add(s, i ? ",{\"name\":" : "{\"name\":");
+        rl_page_json_text(s, l->display->name);
+        rl_str_printf(s, ",\"id\":%zu,\"n\":%d", i, l->n);
+        const struct {
+            const char *name;
+            double value;
+        } numbers[] = {{"knee", l->knee},
+                       {"first", l->first},
+                       {"last", l->last},
+                       {"low", l->low},
+                       {"high", l->high},
+                       {"errorMax", l->pixels ? l->error_max : (double)NAN},
+                       {"errorMean", l->pixels ? l->error_sum / (double)l->pixels : (double)NAN}};
+        for (size_t k = 0; k < sizeof numbers / sizeof *numbers; k++) {
+            rl_str_printf(s, ",\"%s\":", numbers[k].name);
+            put_number(s, numbers[k].value);
+        }
+        rl_str_printf(s, ",\"pixels\":%llu}", l->pixels);
+    }
+    rl_str_add(s, "],\"displayOf\":[");
+    for (size_t v = 0; page->source->n_displays && v < page->plan->n_listed; v++)
+        rl_str_printf(s, "%s%zu", v ? "," : "", page->source->display_of[v]);
+    rl_str_add(s, "]");
+}
+
+/* 256 colours, three bytes each. */
+static void add_heat(rl_str *s)
+{
+    rl_str_add(s, ",\"heat\":[");
+    for (int i = 0; i < 256; i++) {
+        float rgb[3];
+        rl_heat_color(i / 255.0, rgb);
+        for (int c = 0; c < 3; c++)
+            rl_str_printf(s, "%s%d", i || c ? "," : "", (int)lrintf(rgb[c] * 255));
+    }
+    rl_str_add(s, "]");
+}
+
+static void put_page(const writer *w)
+{
+    rl_str s = {0};
+    rl_str_add(&s, "{");
+    add_displays(w->page, &s);
+    rl_str_printf(&s, ",\"budget\":%llu,\"leftOut\":%zu", w->page->options.budget, w->page->left_out);
+    add_heat(&s);
+    add_frames(w, &s);
+    rl_str_add(&s, "}\n");
+    if (s.failed)
+        errno = ENOMEM;
+    else
+        put(w, rl_str_text(&s));
+    rl_str_free(&s);
+}
+
+/* ---- blocks -------------------------------------------------------------------------------------------- */
+
+static rl_code put_block(const writer *w, size_t id, const uint8_t *data, size_t size, rl_error *err)
+{
+    size_t n = rl_page_base64_size(size);
+    char *text = rl_malloc(n);
+    if (!text)
+        return rl_fail_memory(err, n);
+    rl_page_base64(data, size, text);
+    fprintf(w->file, "<script type=\"application/octet-stream\" id=\"block-%zu\">", id);
+    fwrite(text, 1, n, w->file);
+    put(w, "</script>\n");
+    rl_free(text);
+    return RL_OK;
+}
+
+static rl_code put_lut(const writer *w, size_t i, rl_error *err)
+{
+    const rl_page_lut *lut = &w->page->luts[i];
+    rl_page_plain plain = {16, 3, lut->n, lut->n * lut->n, lut->entries};
+    uint8_t *packed = NULL;
+    size_t size = 0;
+    rl_code code = rl_page_pack(&plain, &packed, &size, err);
+    if (!code)
+        code = put_block(w, i, packed, size, err);
+    rl_free(packed);
+    return code;
+}
+
+static rl_code put_held(const writer *w, const rl_page_held *held, size_t id, rl_error *err)
+{
+    rl_code code = RL_OK;
+    for (size_t i = 0; i < held->n_blocks && !code; i++) {
+        const rl_page_block *b = &held->blocks[i];
+        if (!b->size)
+            continue;
+        uint8_t *data = rl_malloc(b->size);
+        code = data ? rl_page_spool_read(&w->page->spool, b->at, data, b->size, err)
+                    : rl_fail_memory(err, b->size);
+        if (!code)
+            code = put_block(w, id + i, data, b->size, err);
+        rl_free(data);
+    }
+    return code;
+}
+
+static rl_code put_blocks(const writer *w, rl_error *err)
+{
+    const rl_ab_page *page = w->page;
+    size_t id = page->source->n_displays;
+    rl_code code = RL_OK;
+    for (size_t i = 0; i < page->source->n_displays && !code; i++)
+        code = put_lut(w, i, err);
+    for (size_t i = 0; i < page->n_seen && !code; i++) {
+        if (!w->order[i])
+            continue;
+        code = put_held(w, w->order[i], id, err);
+        id += w->order[i]->n_blocks;
+    }
+    return code;
+}
+
+/* ---- the page ------------------------------------------------------------------------------------------ */
+
+static const char *source(const char *name)
+{
+    for (const rl_embedded_text *e = rl_embedded_page; e->name; e++)
+        if (!strcmp(e->name, name))
+            return (const char *)e->text;
+    return "";
+}
+
+static void put_scripts(const writer *w)
+{
+    for (const rl_embedded_text *e = rl_embedded_page; e->name; e++)
+        if (!strcmp(rl_path_extension(e->name), ".js"))
+            put(w, (const char *)e->text);
+}
+
+static void put_html(const writer *w, const char *text)
+{
+    rl_str s = {0};
+    rl_page_html_text(&s, text);
+    if (s.failed)
+        errno = ENOMEM;
+    put(w, rl_str_text(&s));
+    rl_str_free(&s);
+}
+
+/* In JSON, '<' is in strings only: "</script>" and "<!--" cannot end or change the element around it. */
+static void put_metrics(const writer *w)
+{
+    for (const char *at = w->metrics_text; *at;) {
+        size_t n = strcspn(at, "<");
+        fwrite(at, 1, n, w->file);
+        at += n;
+        if (*at) {
+            put(w, "\\u003c");
+            at++;
+        }
+    }
+}
+
+static void put_title(const writer *w)
+{
+    for (size_t v = 0; v < w->page->plan->n_listed; v++) {
+        put(w, v ? " · " : "");
+        put_html(w, w->page->plan->variants[v].name);
+    }
+}
+
+static rl_code put_part(const writer *w, const char *name, size_t n, rl_error *err)
+{
+    const char *summary = json_string_value(json_object_get(w->metrics, "summary"));
+    if (!strncmp(name, "title", n))
+        put_title(w);
+    else if (!strncmp(name, "style", n))
+        put(w, source("page.css"));
+    else if (!strncmp(name, "summary", n))
+        put_html(w, summary ? summary : "");
+    else if (!strncmp(name, "metrics", n))
+        put_metrics(w);
+    else if (!strncmp(name, "page", n))
+        put_page(w);
+    else if (!strncmp(name, "script", n))
+        put_scripts(w);
+    else if (!strncmp(name, "blocks", n))
+        return put_blocks(w, err);
+    return RL_OK;
+}
+
+/* Places in page.html are written {{name}}. */
+static rl_code put_all(const writer *w, rl_error *err)
+{
+    rl_code code = RL_OK;
+    for (const char *at = source("page.html"); at && !code;) {
+        const char *open = strstr(at, "{{"), *close = open ? strstr(open, "}}") : NULL;
+        if (!close) {
+            put(w, at);
+            break;
+        }
+        fwrite(at, 1, (size_t)(open - at), w->file);
+        code = put_part(w, open + 2, (size_t)(close - open - 2), err);
+        at = close + 2;
+    }
+    return code;
+}
+
+static rl_code write_file(writer *w, const char *path, unsigned long long *bytes, rl_error *err)
+{
+    char temp[4096];
+    rl_code code = rl_file_temp(path, temp, sizeof temp, err);
+    if (code)
+        return code;
+    errno = 0;
+    w->file = fopen(temp, "wbe");
+    if (!w->file)
+        return rl_fail_file(err, RL_E_IO, path, "cannot be written: %s", strerror(errno));
+    code = put_all(w, err);
+    long size = ftell(w->file);
+    bool bad = ferror(w->file) || errno == ENOMEM;
+    bad |= fclose(w->file) != 0;
+    if (!code && bad)
+        code = errno == ENOMEM ? rl_fail_memory(err, 4096)
+                               : rl_fail_file(err, RL_E_IO, path, "cannot be written: %s", strerror(errno));
+    *bytes = size > 0 ? (unsigned long long)size : 0;
+    if (!code)
+        return rl_file_commit(temp, path, err);
+    rl_file_discard(temp);
+    return code;
+}
+
+/* What is in the page besides frames; tables are a quarter smaller than this once packed. */
+static unsigned long long fixed_bytes(const rl_ab_page *page, const char *metrics)
+{
+    unsigned long long bytes = strlen(metrics) + 4096;
+    for (const rl_embedded_text *e = rl_embedded_page; e->name; e++)
+        bytes += strlen((const char *)e->text);
+    for (size_t i = 0; i < page->source->n_displays; i++) {
+        size_t n = (size_t)page->luts[i].n;
+        bytes += rl_page_base64_size(6 * n * n * n);
+    }
+    for (size_t i = 0; i < page->n_seen; i++)
+        bytes += 96 + page->seen[i].files.length + page->seen[i].error.length;
+    return bytes;
+}
+
+static void summarize(const rl_ab_page *page, unsigned long long bytes, rl_ab_page_summary *out)
+{
+    *out = (rl_ab_page_summary){.held = page->n_held, .left_out = page->left_out, .bytes = bytes};
+    for (size_t i = 0; i < page->n_seen; i++)
+        out->frames += page->seen[i].error.length == 0;
+}
+
+rl_code rl_ab_page_write(rl_ab_page *page, const char *path, const char *metrics, rl_ab_page_summary *out,
+                         rl_error *err)
+{
+    json_error_t bad;
+    writer w = {.page = page, .metrics_text = metrics};
+    unsigned long long bytes = 0;
+    rl_code code = RL_OK;
+    w.metrics = json_loads(metrics, 0, &bad);
+    if (!json_is_object(w.metrics)) {
+        code = rl_fail_file(err, RL_E_FORMAT, path, "the metrics are no JSON object: %s", bad.text);
+        goto done;
+    }
+    rl_page_shrink(page, fixed_bytes(page, metrics));
+    w.order = rl_calloc(page->n_seen + 1, sizeof *w.order);
+    if (!w.order) {
+        code = rl_fail_memory(err, page->n_seen * sizeof *w.order);
+        goto done;
+    }
+    for (size_t i = 0; i < page->n_held; i++)
+        w.order[page->held[i].seen] = &page->held[i];
+    code = write_file(&w, path, &bytes, err);
+    if (!code && page->left_out)
+        rl_report(page->options.log, RL_NOTE, (rl_where){.file = path},
+                  "%zu frames are linked and not held: the page would be larger than %llu MiB",
+                  page->left_out, page->options.budget >> 20);
+    if (!code && out)
+        summarize(page, bytes, out);
+done:
+    json_decref(w.metrics);
+    rl_free(w.order);
+    return code;
+}
