@@ -1,6 +1,7 @@
 /* The ledger of energy (graph/run/energy.h), behind common.cl: what a pass adds up when somebody asks for its sums.
  * Nothing of it is in the program otherwise. A step over RL_EVERY_BAND goes through the vectors of a band in order and
- * posts what their lanes have, a material at a time; sums are of two floats (Knuth's two-sum), 48 bits together. */
+ * posts what their lanes have, a material at a time. Lanes are added up for as long as the material stays the same, a row
+ * at most; then they join sums of two floats (Knuth's two-sum), 48 bits together. */
 #ifndef WANTS_energy
 #define WANTS_energy 0
 #endif
@@ -16,6 +17,8 @@
 typedef struct band_t {
     global float *sums; /* of material 0 */
     int first, last;    /* rows */
+    uint material;      /* that `lanes` are of */
+    floatv lanes[RL_SUM_VALUES];
 } band_t;
 
 /* The band of a work-item, with empty sums. */
@@ -29,13 +32,11 @@ static inline band_t energy_band(global float *energy, constant frame_t *f)
     b.last = min(f->valid[3], (i + 1) * rows);
     for (int k = 0; k < n; k++)
         b.sums[k] = 0.0f;
+    b.material = 0;
+    for (int k = 0; k < RL_SUM_VALUES; k++)
+        b.lanes[k] = 0.0f;
     return b;
 }
-
-/* The vectors of a band that have pixels of the image. */
-#define ENERGY_EACH_VECTOR(f, b, x, y)                                                                       \
-    for (int y = (b).first; y < (b).last; y++)                                                               \
-        for (int x = (f)->valid[0] / RL_W * RL_W; x < (f)->valid[2]; x += RL_W)
 
 static inline float energy_lanes(floatv v)
 {
@@ -58,17 +59,34 @@ static inline void energy_add(global float *sum, float v)
     sum[0] = t;
 }
 
-/* The lanes of one material: the values in their order, and how many lanes there are. */
-static inline void energy_post(const band_t *b, uint material, intv lanes, const floatv *values)
+static inline void energy_flush(band_t *b)
 {
-    global float *sum = b->sums + 2 * RL_SUM_VALUES * min(material, (uint)RL_SUM_MATERIALS - 1);
+    global float *sum = b->sums + 2 * RL_SUM_VALUES * min(b->material, (uint)RL_SUM_MATERIALS - 1);
+    for (int i = 0; i < RL_SUM_VALUES; i++) {
+        energy_add(sum + 2 * i, energy_lanes(b->lanes[i]));
+        b->lanes[i] = 0.0f;
+    }
+}
+
+/* The vectors of a band that have pixels of the image. */
+#define ENERGY_EACH_VECTOR(f, b, x, y)                                                                       \
+    for (int y = (b).first; y < (b).last; energy_flush(&(b)), y++)                                           \
+        for (int x = (f)->valid[0] / RL_W * RL_W; x < (f)->valid[2]; x += RL_W)
+
+/* The lanes of one material: the values in their order, and how many lanes there are. */
+static inline void energy_post(band_t *b, uint material, intv lanes, const floatv *values)
+{
+    if (material != b->material) {
+        energy_flush(b);
+        b->material = material;
+    }
     for (int i = 0; i < ENERGY_PIXELS; i++)
-        energy_add(sum + 2 * i, energy_lanes(rl_as_floatv(rl_as_intv(values[i]) & lanes)));
-    energy_add(sum + 2 * ENERGY_PIXELS, energy_lanes(rl_select((floatv)0.0f, (floatv)1.0f, lanes)));
+        b->lanes[i] += rl_as_floatv(rl_as_intv(values[i]) & lanes);
+    b->lanes[ENERGY_PIXELS] += rl_select((floatv)0.0f, (floatv)1.0f, lanes);
 }
 
 /* The same for all materials that a vector has, without one included. */
-static inline void energy_post_all(const band_t *b, constant frame_t *f, int x, int y, uintv id, const floatv *values)
+static inline void energy_post_all(band_t *b, constant frame_t *f, int x, int y, uintv id, const floatv *values)
 {
     intv left = rl_insidev(f, x, y);
     while (rl_any(left)) {

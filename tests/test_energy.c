@@ -12,6 +12,7 @@
 #include "graph/base/alloc.h"
 #include "graph/run/energy.h"
 #include "passes/burley.h"
+#include "tests/gaussian_run.h"
 #include "tests/sss_scene.h"
 
 #define FOCAL 700.0f
@@ -227,11 +228,241 @@ static void test_taps(void **state)
     check_against_sums(21, OCCLUDE, 1e-5, 0.05);
 }
 
+/* Light in the middle alone, out of reach of borders and edges: nothing is lost, and what goes in comes out.
+ */
+static void test_closed_scene(void **state)
+{
+    (void)state;
+    sss_scene s = sss_scene_make(5, 9, 160, 150, FOCAL);
+    uint32_t seed = 9;
+    rl_energy e;
+    set_materials(RENORMALIZE);
+    sss_scene_flat(&s, 1, DEPTH, 0);
+    SSS_EACH_PIXEL(&s, x, y, i)
+    {
+        for (size_t c = 0; c < 3; c++) {
+            s.albedo[c * s.n + i] = 0.7f;
+            if (hypot(x - 80, y - 80) < 35)
+                s.diffuse[c * s.n + i] = 3 * sss_random(&seed);
+        }
+        if (x - s.twin.frame.valid[0] < 3)
+            s.stencil[i] = 0;
+    }
+    want_ledger(&s);
+    sss_run_reference(&s, PLAIN);
+    rl_energy_read(s.energy, 1, &e);
+    for (int c = 0; c < 3; c++) {
+        assert_true(e.in[c] > 100 && e.clamped[c] == 0);
+        assert_true(e.border[c] == 0 && e.off_screen[c] == 0 && e.redistributed[c] < 1e-6 * e.in[c]);
+    }
+    assert_true(rl_energy_imbalance(&e) < 1e-6);
+    sss_scene_free(&s);
+}
+
+/* Evenly lit, every filter gives back what it loses, and what it loses is what the weights say. */
+static void test_even_light(void **state)
+{
+    (void)state;
+    const gaussian_material *mixtures = gaussian_mixtures;
+    for (int filter = 0; filter < 5; filter++) {
+        sss_scene s = sss_scene_make(0, 0, 150, 90, 350);
+        rl_energy e;
+        set_materials(RENORMALIZE);
+        sss_scene_flat(&s, 1, DEPTH, 1);
+        SSS_EACH_PIXEL(&s, x, y, i)
+        {
+            for (size_t c = 0; c < 3; c++)
+                s.albedo[c * s.n + i] = 1;
+            if (y > 60)
+                s.stencil[i] = 0;
+        }
+        want_ledger(&s);
+        if (filter == 0)
+            sss_run_reference(&s, AREA);
+        else if (filter < 3)
+            sss_run_burley(&s, filter == 1 ? AUTO : 33, AREA);
+        else
+            gaussian_run_on(&s, filter == 3 ? SEPARABLE : FULL, mixtures, SSS_MATERIALS * sizeof *mixtures,
+                            sss_session);
+        rl_energy_read(s.energy, 1, &e);
+        for (int c = 0; c < 3; c++)
+            assert_true(e.border[c] > 0 && e.off_screen[c] > 0);
+        print_message("filter %d: imbalance %.2g, open %.2g\n", filter, rl_energy_imbalance(&e),
+                      rl_energy_open(&e));
+        assert_true(rl_energy_imbalance(&e) < 1e-5);
+        assert_true(rl_energy_open(&e) < 1e-5);
+        sss_scene_free(&s);
+    }
+}
+
+typedef struct gaussian_loss {
+    double border, off_screen, mean;
+} gaussian_loss;
+
+/* A Gaussian of 20 mm² at a pixel of material 1, over `rx` by `ry` pixels: what its own light loses, and the
+ * mean. */
+static gaussian_loss lose(const sss_scene *s, const float *light, int x, int y, int rx, int ry)
+{
+    const int *v = s->twin.frame.valid;
+    double all = 0, same = 0, border = 0, outside = 0, sum = 0;
+    size_t own = (size_t)y * (size_t)s->twin.frame.columns + (size_t)x;
+    for (int dy = -ry; dy <= ry; dy++)
+        for (int dx = -rx; dx <= rx; dx++) {
+            double w = exp(-(dx * dx + dy * dy) / 40.0);
+            size_t at = (size_t)(y + dy) * (size_t)s->twin.frame.columns + (size_t)(x + dx);
+            if (dx * dx + dy * dy > 180) /* 3 sigma */
+                continue;
+            all += w;
+            if (x + dx < v[0] || y + dy < v[1] || x + dx >= v[2] || y + dy >= v[3])
+                outside += w;
+            else if (s->stencil[at] != 1)
+                border += w;
+            else {
+                same += w;
+                sum += w * (double)light[at];
+            }
+        }
+    return (gaussian_loss){(double)light[own] * border / all, (double)light[own] * outside / all, sum / same};
+}
+
+/* Gaussians on a plane; separable: the rows' losses, then what the columns lose of what the rows have moved.
+ */
+static void test_gaussian_sums(void **state)
+{
+    (void)state;
+    const gaussian_material one[2] = {{0}, {1, 1, {20}, {{1, 0.5f, 0.25f}}, 0, 0, 1, 0}};
+    for (int separable = 0; separable < 2; separable++) {
+        sss_scene s = sss_scene_make(11, 3, 70, 50, FOCAL);
+        float *line = sss_planes(s.n);
+        uint32_t seed = 3;
+        rl_energy e;
+        double border = 0, outside = 0, in = 0;
+        sss_scene_flat(&s, 1, DEPTH, 1);
+        SSS_EACH_PIXEL(&s, x, y, i)
+        {
+            s.stencil[i] = x > 40 && x + y < 100;
+            s.diffuse[i] = 2 * sss_random(&seed);
+            s.albedo[i] = 1;
+        }
+        want_ledger(&s);
+        gaussian_run_on(&s, separable, one, sizeof one, sss_session);
+        for (int step = 0; step < (separable ? 2 : 1); step++)
+            SSS_EACH_PIXEL(&s, x, y, i)
+            {
+                if (!s.stencil[i])
+                    continue;
+                gaussian_loss l = lose(&s, step ? line : s.diffuse, x, y, separable && step ? 0 : 14,
+                                       separable && !step ? 0 : 14);
+                border += l.border;
+                outside += l.off_screen;
+                in += step ? 0 : s.diffuse[i];
+                if (!step)
+                    line[i] = (float)l.mean;
+            }
+        rl_energy_read(s.energy, 1, &e);
+        assert_true(fabs(e.in[0] - in) < 1e-6 * in && border > 0.03 * in && outside > 0.03 * in);
+        assert_true(fabs(e.border[0] - border) < 1e-5 * in && fabs(e.off_screen[0] - outside) < 1e-5 * in);
+        assert_true(rl_energy_open(&e) < 1e-5);
+        rl_free(line);
+        sss_scene_free(&s);
+    }
+}
+
+/* Too small for a filter: taps: auto loses nothing. */
+static void test_no_filter(void **state)
+{
+    (void)state;
+    sss_scene s = make_scene(100, 64, RENORMALIZE);
+    rl_energy e;
+    s.twin.frame.camera.focal[0] = s.twin.frame.camera.focal[1] = 10;
+    want_ledger(&s);
+    sss_run_burley(&s, AUTO, PLAIN);
+    rl_energy_read(s.energy, 1, &e);
+    assert_true(e.in[0] > 0 && rl_energy_imbalance(&e) == 0);
+    assert_true(e.border[0] == 0 && e.off_screen[0] == 0 && e.redistributed[0] == 0);
+    sss_scene_free(&s);
+}
+
+/* The same sums on one thread and on all, and for vectors of 4 and 8 nearly so. */
+static void test_threads(void **state)
+{
+    (void)state;
+    sss_scene s = make_scene(100, 64, RENORMALIZE);
+    const sss_burley_params p = {AUTO, SCREEN, AREA, TWIN_BLUE, 7};
+    cl_session *one = cl_open(1);
+    float *first = s.energy;
+    rl_energy a, b;
+    assert_non_null(one);
+    want_ledger(&s);
+    sss_run(&s, &rl_pass_sss_burley, &p, sss_session);
+    first = s.energy;
+    want_ledger(&s);
+    sss_run(&s, &rl_pass_sss_burley, &p, one);
+    for (size_t m = 1; m < 3; m++) {
+        rl_energy_read(first, m, &a);
+        rl_energy_read(s.energy, m, &b);
+        assert_memory_equal(&a, &b, sizeof a);
+    }
+    cl_close(&one);
+    rl_free(first);
+    sss_scene_free(&s);
+}
+
+/* Words of the ledger. */
+static void test_figures(void **state)
+{
+    (void)state;
+    rl_energy e = {.in = {2, 1, 0}, .out = {1, 1.1, 0}};
+    assert_true(fabs(rl_energy_imbalance(&e) - 0.5) < 1e-12);
+    e.border[0] = 1.5;
+    e.redistributed[0] = 0.5;
+    assert_true(fabs(rl_energy_open(&e) - 0.1) < 1e-12);
+    e.clamped[1] = -0.1;
+    assert_true(rl_energy_open(&e) < 1e-12);
+    e.out[2] = 1;
+    assert_true(isinf(rl_energy_imbalance(&e)));
+}
+
+/* Rows of a node: the whole, materials that have something; memory that runs out leaves the ledger alone. */
+static void test_ledger(void **state)
+{
+    (void)state;
+    rl_energy_ledger ledger = {0};
+    rl_energy_row about = {.variant = 2, .node = "sss", .frame = 7};
+    rl_error err = {0};
+    float *sums = rl_calloc(RL_SUM_FLOATS, sizeof *sums);
+    assert_non_null(sums);
+    for (size_t band = 0; band < RL_BANDS; band++) {
+        float *m = sums + 2 * (band * RL_SUM_MATERIALS + 3) * RL_SUM_VALUES;
+        m[2 * ENERGY_OUT] = 1;
+        m[2 * ENERGY_OUT + 1] = 1e-9f;
+        m[2 * ENERGY_PIXELS] = 4;
+        m[-2 * RL_SUM_VALUES + 2 * ENERGY_PIXELS] = 1; /* material 2: pixels without light */
+    }
+    rl_alloc_fail_at(1, 0);
+    assert_int_equal(rl_energy_ledger_add(&ledger, &about, sums, 5, &err), RL_E_MEMORY);
+    rl_alloc_fail_at(0, 0);
+    assert_int_equal(ledger.n, 0);
+    for (int i = 0; i < 40; i++)
+        assert_int_equal(rl_energy_ledger_add(&ledger, &about, sums, 5, &err), RL_OK);
+    assert_int_equal(ledger.n, 80);
+    const rl_energy_row *all = &ledger.rows[78], *one = &ledger.rows[79];
+    assert_true(all->material == RL_ENERGY_ALL && one->material == 3 && one->variant == 2 && one->frame == 7);
+    assert_true(one->energy.pixels == 4 * RL_BANDS && all->energy.pixels == 5 * RL_BANDS);
+    assert_true(fabs(one->energy.out[0] - RL_BANDS * (1 + 1e-9)) < 1e-12);
+    rl_energy_ledger_free(&ledger);
+    assert_null(ledger.rows);
+    rl_free(sums);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_dense_sum),
-        cmocka_unit_test(test_taps),
+        cmocka_unit_test(test_dense_sum),     cmocka_unit_test(test_taps),
+        cmocka_unit_test(test_closed_scene),  cmocka_unit_test(test_even_light),
+        cmocka_unit_test(test_gaussian_sums), cmocka_unit_test(test_no_filter),
+        cmocka_unit_test(test_threads),       cmocka_unit_test(test_figures),
+        cmocka_unit_test(test_ledger),
     };
     return cmocka_run_group_tests(tests, sss_open, sss_close);
 }

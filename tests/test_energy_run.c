@@ -170,12 +170,10 @@ static void check_frame(const seen *s, long long frame, int skin)
             assert_true(one->energy.out[0] > 0 && one->energy.out[0] <= all->energy.out[0]);
         }
         const rl_energy *e = &find(s, v, "sss", frame, skin)->energy;
-        if (strcmp(changes[v].name, "off"))
-        {
+        if (strcmp(changes[v].name, "off")) {
             if (e->border[0] + e->off_screen[0] <= 0)
                 fail_msg("'%s' loses nothing: in %g out %g", changes[v].name, e->in[0], e->out[0]);
-        }
-        else
+        } else
             assert_true(e->out[0] > 0 && fabs(e->in[0] - e->out[0]) < 1e-6 * e->in[0]);
         if (!strcmp(changes[v].name, "occlude"))
             assert_true(fabs(e->redistributed[0]) < 1e-6 * e->in[0] && e->out[0] < e->in[0]);

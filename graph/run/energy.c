@@ -110,6 +110,14 @@ rl_code rl_energy_ledger_add(rl_energy_ledger *ledger, const rl_energy_row *row,
     return RL_OK;
 }
 
+rl_code rl_energy_ledger_push(rl_energy_ledger *ledger, const rl_energy_row *row, rl_error *err)
+{
+    rl_code code = make_room(ledger, 1, err);
+    if (!code)
+        ledger->rows[ledger->n++] = *row;
+    return code;
+}
+
 int rl_energy_image(const rl_graph *graph, size_t node)
 {
     const rl_graph_node *n = &graph->nodes[node];

@@ -87,6 +87,9 @@ void rl_energy_ledger_free(rl_energy_ledger *ledger);
 rl_code rl_energy_ledger_add(rl_energy_ledger *ledger, const rl_energy_row *row, const float *sums,
                              size_t n_materials, rl_error *err);
 
+/* A copy of one row. RL_E_MEMORY leaves the ledger as it was. */
+rl_code rl_energy_ledger_push(rl_energy_ledger *ledger, const rl_energy_row *row, rl_error *err);
+
 /* The image "NODE.energy" of a graph's node, or -1: the pass keeps no ledger. */
 int rl_energy_image(const rl_graph *graph, size_t node);
 
