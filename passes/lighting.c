@@ -103,6 +103,13 @@ static bool stochastic(const void *values, bool march)
     return march && p->shadow_jitter;
 }
 
+/* With three lights; how many there are is not known here. */
+static double cost(const void *p)
+{
+    (void)p;
+    return 26;
+}
+
 const rl_pass rl_pass_lighting = {
     .name = "lighting",
     .help = "direct and ambient light: diffuse transmission, specular reflection, translucency",
@@ -119,4 +126,5 @@ const rl_pass rl_pass_lighting = {
     .lights = true,
     .ambient = true,
     .stochastic = stochastic,
+    .cost = cost,
 };

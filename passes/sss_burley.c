@@ -98,6 +98,11 @@ static bool stochastic(const void *values, bool march)
     const sss_burley_params *p = values;
     (void)march;
     return p->rotation != 0; /* none */
+/* Of a picture that is about half skin. */
+static double cost(const void *of)
+{
+    const sss_burley_params *p = of;
+    return 45 + 2.0 * (p->taps > 0 ? p->taps : 30);
 }
 
 const rl_pass rl_pass_sss_burley = {
@@ -115,4 +120,5 @@ const rl_pass rl_pass_sss_burley = {
     .tables = tables,
     .conserves = true,
     .stochastic = stochastic,
+    .cost = cost,
 };

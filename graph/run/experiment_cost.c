@@ -5,8 +5,9 @@
 #include "graph/base/file.h"
 #include "graph/run/experiment_parts.h"
 
-/* In reads or writes of a plane: `relit bench configs/skin.yaml --size 1920x1080`, two threads. */
-enum { DECODE_CHANNEL = 40, ENCODE_EXR_CHANNEL = 120, ENCODE_IMAGE_CHANNEL = 240 };
+/* In reads or writes of a plane: `relit bench configs/skin.yaml --size 1920x1080`, ratios to the conversions
+ * between layouts. */
+enum { DECODE_CHANNEL = 21, ENCODE_EXR_CHANNEL = 42, ENCODE_IMAGE_CHANNEL = 84 };
 
 static double step_weight(const rl_plan *plan, const rl_plan_step *step)
 {
@@ -72,8 +73,7 @@ static double read_cost(const rl_group *g, bool measured)
     return measured ? (g->load_ns + g->step_ns) / (double)g->frames : DECODE_CHANNEL * planes + steps;
 }
 
-static double write_cost(const rl_experiment *x, size_t capture, const rl_group *g, size_t variant,
-                         bool measured)
+static double write_cost(const rl_experiment *x, size_t capture, size_t variant, bool measured)
 {
     const rl_session *s = x->sessions[variant];
     const rl_sequence *q = &s->sequences[capture];
@@ -81,7 +81,7 @@ static double write_cost(const rl_experiment *x, size_t capture, const rl_group 
     if (!x->variants[variant].files)
         return 0;
     if (measured)
-        return x->captures[capture].write_ns[variant] / (double)g->frames;
+        return x->captures[capture].write_ns[variant] / (double)x->captures[capture].write_frames;
     for (size_t o = 0; o < s->n_outputs; o++) {
         const rl_graph_output *out = &q->graph->outputs[q->first_output + o];
         bool exr = !strcasecmp(rl_path_extension(s->outputs[o].spec->file), ".exr");
@@ -115,7 +115,7 @@ static void add_capture(const rl_experiment *x, size_t capture, bool measured, d
             *all += any ? cost : 0;
         }
         for (size_t m = 0; m < g->n; m++) {
-            double write = frames * write_cost(x, capture, g, g->members[m], measured);
+            double write = frames * write_cost(x, capture, g->members[m], measured);
             *all += write;
             *sum += write + frames * read;
             *one += g->members[m] == 0 ? write + frames * read : 0;
@@ -129,7 +129,7 @@ void rl_experiment_cost_of(const rl_experiment *x, rl_experiment_cost *out)
     bool measured = x->n_captures > 0;
     for (size_t k = 0; k < x->n_captures; k++)
         for (size_t g = 0; g < x->captures[k].n_groups; g++)
-            measured &= x->captures[k].groups[g].frames > 0;
+            measured &= x->captures[k].groups[g].frames > 0 && x->captures[k].write_frames > 0;
     for (size_t k = 0; k < x->n_captures; k++)
         add_capture(x, k, measured, &all, &one, &sum);
     *out = (rl_experiment_cost){

@@ -24,14 +24,18 @@ typedef struct rl_group {
     double *node_ns; /* [nodes]: on the device, of all frames that ran */
     double step_ns;  /* of conversions and copies */
     double load_ns;  /* reading */
-    size_t frames;   /* that ran */
+    size_t frames;   /* that ran and are in these sums: the first only until there is a second, since it has
+                        programs to compile and files to find */
+    bool warm;       /* the first is left out */
 } rl_group;
 
 typedef struct rl_experiment_capture {
     rl_group *groups;
     size_t n_groups;
     int in_flight;
-    double *write_ns; /* [variants] */
+    double *write_ns; /* [variants]: of write_frames frames, the first left out in the same way */
+    size_t write_frames;
+    bool write_warm;
 } rl_experiment_capture;
 
 struct rl_experiment {

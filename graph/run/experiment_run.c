@@ -66,6 +66,12 @@ static void batch_load(void *ctx, size_t item, int index)
 
 static void add_times(rl_group *g, const rl_frame *f, const rl_span *spans)
 {
+    if (g->frames == 1 && !g->warm) {
+        memset(g->node_ns, 0, g->merged->graph->n_nodes * sizeof *g->node_ns);
+        g->step_ns = g->load_ns = 0;
+        g->frames = 0;
+        g->warm = true;
+    }
     for (size_t i = 0; i < g->plan->n_steps; i++) {
         const rl_plan_step *step = &g->plan->steps[i];
         double ns = (double)(spans[i].end - spans[i].start);
@@ -204,6 +210,12 @@ static rl_code make_delivery(const run_state *r, delivery *d, rl_error *err)
 static rl_code deliver(run_state *r, slot *s, delivery *d, rl_error *err)
 {
     rl_code code = s->error.code;
+    if (r->c->write_frames == 1 && !r->c->write_warm) {
+        memset(r->c->write_ns, 0, r->x->n * sizeof *r->c->write_ns);
+        r->c->write_frames = 0;
+        r->c->write_warm = true;
+    }
+    r->c->write_frames++;
     for (size_t v = 0; v < r->x->n && !code; v++) {
         rl_frame *f = &s->frames[group_of(r->c, v)];
         code = write_variant(r, d, f, v, err);
