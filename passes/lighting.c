@@ -97,17 +97,17 @@ static const rl_step steps[] = {
     {"lighting_energy", .domain = RL_EVERY_BAND, .with = "energy"},
 };
 
-static bool stochastic(const void *values, bool march)
-{
-    const lighting_params *p = values;
-    return march && p->shadow_jitter;
-}
-
 /* With three lights; how many there are is not known here. */
 static double cost(const void *p)
 {
     (void)p;
     return 26;
+}
+
+static bool stochastic(const void *values, bool march)
+{
+    const lighting_params *p = values;
+    return march && p->shadow_jitter;
 }
 
 const rl_pass rl_pass_lighting = {

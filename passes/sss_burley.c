@@ -93,16 +93,18 @@ static rl_code tables(const rl_pass_input *in, rl_arena *arena, rl_tables *out, 
     return RL_OK;
 }
 
-static bool stochastic(const void *values, bool march)
-{
-    const sss_burley_params *p = values;
-    (void)march;
-    return p->rotation != 0; /* none */
 /* Of a picture that is about half skin. */
 static double cost(const void *of)
 {
     const sss_burley_params *p = of;
     return 45 + 2.0 * (p->taps > 0 ? p->taps : 30);
+}
+
+static bool stochastic(const void *values, bool march)
+{
+    const sss_burley_params *p = values;
+    (void)march;
+    return p->rotation != 0; /* none */
 }
 
 const rl_pass rl_pass_sss_burley = {
@@ -118,7 +120,7 @@ const rl_pass rl_pass_sss_burley = {
     .ports = RL_ARRAY(ports),
     .steps = RL_ARRAY(steps),
     .tables = tables,
-    .conserves = true,
     .stochastic = stochastic,
     .cost = cost,
+    .conserves = true,
 };

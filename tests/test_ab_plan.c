@@ -280,8 +280,9 @@ static void test_lights_of_the_capture(void **state)
     (void)state;
     static const char manifest[] = "relit_capture: 1\nlights: {key: {type: point, shadow: screen}}\n";
     file_write(folder, "capture.yaml", manifest, strlen(manifest));
-    command c = {
-        1, {"graph.sss.taps=8,16"}, {{"lights", "null"}, {"capture", "{lights: {a: {shadow: none}}}"}}};
+    command c = {.pipelines = 1,
+                 .vary = {"graph.sss.taps=8,16"},
+                 .set = {{"lights", "null"}, {"capture", "{lights: {a: {shadow: none}}}"}}};
     config_assert_fine(make(c));
     assert_null(seed_of(2, "graph.light.seed"));
     c.set[1][1] = "{lights: {a: {shadow: screen}}}";

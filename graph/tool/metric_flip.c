@@ -129,10 +129,14 @@ static void load_row(const rl_flip *f, const rl_metric_image *image, const tile 
     int padded = t->n + 2 * REACH;
     for (int c = 0; c < 3; c++) {
         const float *row = image->plane[image->channels == 1 ? 0 : c] + (size_t)y * image->stride;
-        for (int i = 0; i < padded; i++) {
-            int x = t->x0 - REACH + i;
-            t->padded[c][i] = (double)row[x < 0 ? 0 : x < f->width ? x : f->width - 1];
-        }
+        int x = t->x0 - REACH, begin = x < 0 ? -x : 0;
+        int end = x + padded < f->width ? padded : f->width - x;
+        for (int i = 0; i < begin; i++)
+            t->padded[c][i] = (double)row[0];
+        for (int i = begin; i < end; i++)
+            t->padded[c][i] = (double)row[x + i];
+        for (int i = end; i < padded; i++)
+            t->padded[c][i] = (double)row[f->width - 1];
         rl_flip_curve_row(f->input->curve, f->input->scale, t->padded[c], padded);
     }
     rl_flip_opponent_row(t->padded, padded);

@@ -78,14 +78,21 @@ RL_MATH_INLINE double dot(const double m[3], double x, double y, double z)
     return m[0] * x + m[1] * y + m[2] * z;
 }
 
-/* From YCxCz back to colours that a display can show. */
+/* From YCxCz back to colours that a display can show. Several loops: of one the compiler makes no
+ * vectors. */
 RL_MATH_INLINE void shown_body(const rl_matrix *m, double *const f[RL_FLIP_FILTERED], double *const out[3],
                                int n)
 {
     const double *fy = f[RL_FLIP_Y], *fx = f[RL_FLIP_CX], *f1 = f[RL_FLIP_CZ1], *f2 = f[RL_FLIP_CZ2];
     double *restrict r = out[0], *restrict g = out[1], *restrict b = out[2];
+    for (int i = 0; i < n; i++)
+        g[i] = (fy[i] + 16) * (1.0 / 116);
+    for (int i = 0; i < n; i++)
+        r[i] = g[i] + fx[i] * (1.0 / 500);
+    for (int i = 0; i < n; i++)
+        b[i] = g[i] - (f1[i] + f2[i]) * (1.0 / 200);
     for (int i = 0; i < n; i++) {
-        double y = (fy[i] + 16) / 116, x = y + fx[i] / 500, z = y - (f1[i] + f2[i]) / 200;
+        double x = r[i], y = g[i], z = b[i];
         r[i] = clamp(dot(m->m[0], x, y, z));
         g[i] = clamp(dot(m->m[1], x, y, z));
         b[i] = clamp(dot(m->m[2], x, y, z));

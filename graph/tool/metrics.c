@@ -147,11 +147,13 @@ double rl_metric_peak(const rl_metric_image *reference)
     return peak;
 }
 
-static double percentile(float *values, size_t n, double p)
+/* Percentiles in ascending order: what an earlier one left before *from is not above what is behind. */
+static double percentile(float *values, size_t n, double p, size_t *from)
 {
     double rank = p * (double)(n - 1);
     size_t k = (size_t)rank;
-    double low = (double)rl_select(values, n, k), high = low;
+    double low = (double)rl_select(values + *from, n - *from, k - *from), high = low;
+    *from = k;
     if (k + 1 < n) { /* the smallest of those behind */
         high = (double)values[k + 1];
         for (size_t i = k + 2; i < n; i++)
@@ -184,9 +186,13 @@ void rl_metric_stats_of(rl_metric metric, float *values, size_t n, double peak, 
     out[RL_STAT_MEAN] = mean_of(metric, values, n, peak);
     if (metric == RL_METRIC_PSNR)
         return;
-    out[RL_STAT_MEDIAN] = percentile(values, n, 0.5);
-    out[RL_STAT_P95] = percentile(values, n, 0.95);
-    out[RL_STAT_MAX] = percentile(values, n, 1);
+    size_t from = 0;
+    out[RL_STAT_MEDIAN] = percentile(values, n, 0.5, &from);
+    out[RL_STAT_P95] = percentile(values, n, 0.95, &from);
+    float most = values[from];
+    for (size_t i = from + 1; i < n; i++)
+        most = values[i] > most ? values[i] : most;
+    out[RL_STAT_MAX] = (double)most;
 }
 
 rl_code rl_metric_stats(rl_metric metric, const float *map, const uint8_t *mask, size_t n, double peak,
