@@ -33,7 +33,7 @@ void page_make_display(const float in[3], float out[3])
 {
     for (int c = 0; c < 3; c++) {
         float x = fmaxf(0.8f * in[c] + 0.1f * in[(c + 1) % 3] + 0.1f * in[(c + 2) % 3], 0);
-        out[c] = powf(x / (x + 0.6f), 1 / 1.8f);
+        out[c] = sqrtf(x / (x + 0.6f) + 0.01f) - 0.1f;
     }
 }
 

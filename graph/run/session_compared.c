@@ -60,6 +60,8 @@ rl_code rl_session_compared(rl_session *s, rl_error *err)
         code = add(s, "compare.display", &display, &about, err);
     if (code)
         return code;
+    s->compared.space = about.space;
+    s->compared.shown = chosen->display ? chosen : about.spec;
     s->compared.linear = chosen->layers[0].image;
     s->compared.display = about.space;
     return RL_OK;

@@ -48,9 +48,9 @@ rl_code rl_page_lut_bake(const rl_ab_page_display *display, rl_page_lut *out, rl
     size_t total = (size_t)N * N * N;
     *out = (rl_page_lut){.display = display,
                          .n = N,
-                         .knee = 1.0 / 64,
-                         .first = -0.25,
-                         .last = 256,
+                         .knee = 1.0 / 128,
+                         .first = -0.125,
+                         .last = 128,
                          .low = -0.25,
                          .high = 1.25};
     float *planes = rl_calloc(3 * total, sizeof *planes);

@@ -35,7 +35,7 @@ void rl_page_html_text(rl_str *out, const char *text);
 
 /* ---- displays as tables (ab_page_lut.c) ---- */
 
-enum { RL_PAGE_LUT = 49 };
+enum { RL_PAGE_LUT = 65 };
 
 /* Entry (r, g, b) is at (r · n + g) · n + b of each of three planes: v = low + (high - low) · entry / 65535.
  * An axis of the table is t(x) = sign(x) · log2(1 + |x| / knee), from t(first) at 0 to t(last) at n - 1.

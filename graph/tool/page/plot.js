@@ -11,6 +11,9 @@ function ticks(low, high, n = 4) {
   return list;
 }
 
+/* "0.06", not "0.0600000001". */
+const tickText = v => String(Number(v.toPrecision(6))).replace("-", MINUS);
+
 /* From 0 where 0 is "no difference", else around what there is. */
 function range(metric, values) {
   if (!values.length) return [0, 1];
@@ -71,7 +74,7 @@ class LinePlot {
       main ? this.band(main.bound) : "",
       ...ticks(...this.range).filter(v => v >= this.range[0]).map(v => s("g", {},
         s("line", {class: "grid", x1: left, x2: end, y1: this.y(v), y2: this.y(v)}),
-        s("text", {class: "tick y", x: left - 6, y: this.y(v) + 3.5}, number(v)))),
+        s("text", {class: "tick y", x: left - 6, y: this.y(v) + 3.5}, tickText(v)))),
       ...this.frames.map((f, i) => (i % every ? "" : s("text", {class: "tick x", x: this.x(i), y: base + 15}, f))),
       ...this.series.map(x => this.line(x)),
       this.mark = s("line", {class: "cursor", y1: top, y2: base, visibility: "hidden"}));

@@ -135,8 +135,9 @@ class Viewer {
     const old = this.state;
     this.state = {...old, ...change};
     const load = ["frame", "a", "b", "display", "overlay"].some(k => old[k] !== this.state[k]);
-    if (old.mode !== this.state.mode && (old.mode === "side" || this.state.mode === "side")) this.state.fitAgain = old.fit;
+    const halves = old.mode !== this.state.mode && (old.mode === "side" || this.state.mode === "side");
     if (load) this.refresh();
+    else if (halves && old.fit && this.loaded) this.fit();
     else this.draw();
     this.onchange && this.onchange(old);
   }
@@ -269,11 +270,6 @@ class Viewer {
     requestAnimationFrame(() => {
       this.queued = false;
       if (!this.loaded) return;
-      if (this.state.fitAgain) {
-        this.state.fitAgain = false;
-        this.fit();
-        return;
-      }
       const scene = this.scene();
       this.look.draw(scene);
       this.show(scene);
