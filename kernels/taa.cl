@@ -177,8 +177,10 @@ static inline uintv displacement_key(constant frame_t *f, int x, int y, floatv d
 
 #if WANTS_energy
 #define TAA_LEDGER global float *clamped, global float *redistributed, global float *energy,
+#define TAA_PAST   6 /* the history's colour; for the ledger the same before it was clamped */
 #else
 #define TAA_LEDGER
+#define TAA_PAST 3
 #endif
 
 #define TAA_PORTS                                                                                            \
@@ -219,7 +221,7 @@ kernel void taa(TAA_PORTS)
             int hx = x + (int)(now >> 16) - 32768, hy = y + (int)(now & 65535) - 32768;
             int whole = !rl_any(mask & ((tx != 0.0f) | (ty != 0.0f)));
             mask &= same_surface(f, &h, id, &place, mask, hx, hy, right, below, whole);
-            floatv past[3], n = nearest_count(f, &h, hx, hy, right, below, whole);
+            floatv past[TAA_PAST], n = nearest_count(f, &h, hx, hy, right, below, whole);
             mask &= ~((n < 0.0f) & (place.alone | (place.behind & ~place.follows)));
             if (!rl_any(mask))
                 continue;
@@ -230,7 +232,8 @@ kernel void taa(TAA_PORTS)
             else
                 resample(f, h.color, hx, hy, tx, ty, past);
 #if WANTS_energy
-            floatv whole_past[3] = {past[0], past[1], past[2]};
+            for (int c = 0; whole && c < 3; c++)
+                past[3 + c] = past[c];
 #endif
             clip_to_box(&box, own, past);
             floatv alpha = fmax(1.0f / (1.0f + n), p->blend);
@@ -240,8 +243,8 @@ kernel void taa(TAA_PORTS)
                 result[c] = rl_select(result[c], fma(own[c] - past[c], share, past[c]), mask);
 #if WANTS_energy
             for (int c = 0; c < 3; c++) {
-                cut[c] = rl_select(cut[c], (whole_past[c] - past[c]) * (1.0f - share), mask);
-                brought[c] = rl_select(brought[c], (whole_past[c] - own[c]) * (1.0f - share), mask);
+                cut[c] = rl_select(cut[c], (past[3 + c] - past[c]) * (1.0f - share), mask);
+                brought[c] = rl_select(brought[c], (past[3 + c] - own[c]) * (1.0f - share), mask);
             }
 #endif
             n = fmin(n + 1.0f, COUNT_MAX);

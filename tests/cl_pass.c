@@ -157,8 +157,10 @@ static bool program_text(const cl_job *job, rl_str *s)
         const cl_image *image = cl_image_of(job, port);
         if (port->role == RL_REDUCTION)
             rl_str_printf(s, "#define WANTS_%s %d\n", port->name, cl_has_port(job, port));
-        rl_str_printf(s, "#define HAS_%s %d\n#define LAYOUT_%s %d\n", port->name, image && image->read,
-                      port->name, port->layout);
+        if (port->role == RL_READ)
+            rl_str_printf(s, "#define HAS_%s %d\n", port->name, image && image->read);
+        if (port->role == RL_WRITE)
+            rl_str_printf(s, "#define LAYOUT_%s %d\n", port->name, port->layout);
     }
     ok = ok && add_file(s, "common.cl");
     for (const char *names = pass->kernel_prelude; ok && names && *names;) {
@@ -313,7 +315,7 @@ bool cl_run(cl_session *s, const cl_job *job)
         const rl_port *port = &pass->ports.rows[i];
         const cl_image *image = cl_image_of(job, port);
         const cl_mem mem = cl_has_port(job, port) ? args.mem[k++] : NULL;
-        if (port->role == RL_READ || !image || !mem)
+        if (port->role == RL_READ || port->role == RL_HISTORY || !image || !mem)
             continue;
         size_t skip = port->layout == RL_LINEAR ? RL_GUARD * 4 : 0,
                bytes = cl_floats_of(job->frame, port) * 4;

@@ -70,11 +70,15 @@ void cl_move_image(const frame_t *f, const rl_port *port, float *device, const v
             }
 }
 
+static bool is_fed(const rl_port *port)
+{
+    return port->role == RL_READ || port->role == RL_HISTORY;
+}
+
 const cl_image *cl_image_of(const cl_job *job, const rl_port *port)
 {
     for (size_t i = 0; i < job->n_images; i++)
-        if (!strcmp(job->images[i].port, port->name) &&
-            (port->role == RL_READ ? !job->images[i].write : !!job->images[i].write))
+        if (!strcmp(job->images[i].port, port->name) && is_fed(port) == !job->images[i].write)
             return &job->images[i];
     return NULL;
 }
@@ -103,7 +107,7 @@ float *cl_make_plane(const cl_job *job, const rl_port *port)
         data[i] = NAN;
     if (port->format == RL_ID)
         memset(data, 0, n * 4);
-    if (port->role == RL_READ)
+    if (is_fed(port) && image && image->read)
         cl_move_image(job->frame, port, data, image->read, NULL);
     return data;
 }

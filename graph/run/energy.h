@@ -1,39 +1,46 @@
 /* The ledger of energy: what goes into a node of the graph, what comes out of it, and what becomes of the
  * rest, a material and a channel at a time. A pass keeps it in a REDUCTION port named "energy"
- * (graph/model/pass.h, kernels/energy.cl); an output of the graph that names it, "sss.energy", makes the pass
- * keep it. Nobody asks: it costs nothing. Images have the same bits either way.
+ * (graph/model/pass.h, kernels/energy.cl), and only where an output of the graph names that: "sss.energy".
+ * Images have the same bits with it and without.
  *
- * All values are sums over the pixels of a material (or of all pixels) of scene-linear radiance in the
- * working space: what the camera gets, up to the area of a pixel. A pixel's light is that of the material it
- * has.
+ * All values are sums over the pixels of a material (or over all pixels) of scene-linear radiance in the
+ * working space: what the camera gets, up to the area of a pixel.
  *
- * sss_burley, sss_reference, sss_gaussian, combine: the light that goes through the filter, all values times
- * exit(albedo) F_out of their pixel, so that they are what would leave the surface. `lit` is not part of it.
- *   in             diffuse, before the filter
- *   out            behind it
- *   border         in, times the share of the filter's weights that lie on pixels of other materials or of
- * none off_screen     in, times the share of the weights that lie outside of the image. What is both counts
- * here. Weights of samples that are rejected are those on a plane parallel to the screen (border: occlude has
- * them in its divisor). A sample of the same material at another depth is not rejected: it weighs what its
- * distance says, and nothing is lost by that. clamped        what clamps took from the result; negative: gave
- * to it redistributed  out, less the same sum divided by all weights, rejected ones included: what dividing
- * by the weights that are left puts in the place of what is lost (0 with border: occlude), and with
- *                  weighting: surface the difference between that and dividing by the plane's weights
- * combine has no filter: out is its color less lit, and nothing is lost.
+ * The scattering filters and combine: the light that goes through the filter, without `lit`. All values are
+ * times exit(albedo) F_out of their pixel: what would leave the surface.
  *
- * taa: in is this frame's color, out the result. clamped is what the clip to the neighbours' colours takes
- * from the history, times the history's weight; redistributed is what the history adds before that: (history
- * - color) times its weight.
+ * - in: diffuse, before the filter.
  *
- * lighting: in is emission, out diffuse and lit: what the lights give is the difference. `diffuse` here has
- * not gone through exit(albedo) and F_out.
+ * - out: behind the filter; combine has none: its color less lit.
  *
- * The ledger closes when out = in - border - off_screen - clamped + redistributed. For combine and taa that
- * holds in each pixel, for all materials; for the filters in the sum over the pixels of a material, where
- * each pixel gives to another what it gets from it, weight for weight: a flat surface parallel to the screen,
- * weighting: plain, one albedo, a pattern of taps that equals itself turned by 180 degrees. Evenly lit it
- * closes everywhere. What is left open elsewhere, rl_energy_open, is light that moved to pixels of another
- * albedo, area or angle, and the noise of a few taps. */
+ * - border: in, times the share of the filter's weights that lies on pixels of other materials or of none.
+ *
+ * - off_screen: in, times the share of the weights that lies outside of the image.
+ *
+ * - clamped: what clamps took from the result; negative: what they gave to it.
+ *
+ * - redistributed: out before clamps, less the same sum divided by all weights, rejected ones included: what
+ * dividing by the weights that are left puts in the place of what is lost; 0 with border: occlude. With
+ * weighting: surface also what dividing by the plane's weights changes.
+ *
+ * A sample of another material weighs what it would on a plane parallel to the screen (weighting: surface: on
+ * the tangent plane), as in the divisor of border: occlude. A sample of the same material at another depth is
+ * not rejected: it weighs what its distance says, and nothing is lost by that. sss_gaussian loses in each of
+ * its steps; what the columns lose is of the light that the rows have moved.
+ *
+ * taa: in is this frame's color, out the result; clamped is what the clip to the neighbours' colours takes
+ * from the history, less what keeps a resampled history from going below its darkest sample gives to it, and
+ * redistributed what the history adds before that, history less color; both times the history's weight.
+ * Nothing is lost at borders or off screen: where there is no history, the frame stays as it is.
+ *
+ * lighting: in is emission, out diffuse and lit: what the lights give is the difference. `diffuse` has not
+ * gone through exit(albedo) and F_out there.
+ *
+ * The ledger closes when out = in - border - off_screen - clamped + redistributed. In combine and taa every
+ * pixel closes, and so does every evenly lit pixel of a filter. Otherwise a filter closes in the sum over a
+ * material where two pixels weigh the same for each other: on a plane parallel to the screen, weighting:
+ * plain, one albedo, taps that are the same turned by 180 degrees. What is open elsewhere (rl_energy_open) is
+ * light that went to pixels of another albedo, area or angle, and the noise of a few taps. */
 #ifndef RL_RUN_ENERGY_H
 #define RL_RUN_ENERGY_H
 
