@@ -19,6 +19,7 @@ struct cl_session {
     cl_device_id device;
     cl_context context;
     cl_command_queue queue;
+    bool part; /* of a device */
     struct {
         char *text;
         cl_program program;
@@ -57,6 +58,7 @@ cl_session *cl_open(int threads)
     if (!s)
         return NULL;
     cl_int code;
+    s->part = threads > 0;
     s->device = device;
     s->context = clCreateContext(NULL, 1, &device, NULL, NULL, &code);
     if (!failed("clCreateContext", code))
@@ -66,21 +68,37 @@ cl_session *cl_open(int threads)
     return s;
 }
 
-void cl_close(cl_session **s)
+/* PoCL 3.1: a worker lets go of the last event after those who wait for it have been told, and needs the part
+ * of a device that it is of; so such parts are kept until the program ends. */
+static struct {
+    cl_device_id device;
+    cl_context context;
+    cl_command_queue queue;
+} parts[16];
+static int n_parts;
+
+void cl_close(cl_session **session)
 {
-    if (!*s)
+    cl_session *s = *session;
+    *session = NULL;
+    if (!s)
         return;
-    for (int i = 0; i < (*s)->n_kept; i++) {
-        clReleaseProgram((*s)->kept[i].program);
-        rl_free((*s)->kept[i].text);
+    for (int i = 0; i < s->n_kept; i++) {
+        clReleaseProgram(s->kept[i].program);
+        rl_free(s->kept[i].text);
     }
-    if ((*s)->queue)
-        clReleaseCommandQueue((*s)->queue);
-    if ((*s)->context)
-        clReleaseContext((*s)->context);
-    clReleaseDevice((*s)->device);
-    rl_free(*s);
-    *s = NULL;
+    if (s->part && n_parts < 16) {
+        parts[n_parts].device = s->device;
+        parts[n_parts].context = s->context;
+        parts[n_parts++].queue = s->queue;
+    } else {
+        if (s->queue)
+            clReleaseCommandQueue(s->queue);
+        if (s->context)
+            clReleaseContext(s->context);
+        clReleaseDevice(s->device);
+    }
+    rl_free(s);
 }
 
 /* ---- programs ---- */
