@@ -121,7 +121,7 @@ $(BUILD)/kernels.o $(BUILD)/page.o: %.o: %.c
 $(BUILD)/graph/run/ingest.o: OPT += -O3
 
 # Sums over filter taps, the same; and powers of pixels, where errno and traps would keep sqrt and choices from it.
-$(BUILD)/graph/tool/metric_filter.o: OPT += -O3
+$(BUILD)/graph/tool/metric_filter.o $(BUILD)/graph/tool/metric_flip.o: OPT += -O3
 $(BUILD)/graph/tool/metric_flip_rows.o: OPT += -O3 -fno-math-errno -fno-trapping-math
 
 # Where `make install` puts things that are looked for at run time; a build tree finds its own first.
@@ -151,10 +151,10 @@ $(BUILD)/tests/%: $(BUILD)/tests/%.o $(BUILD)/tests/sanitizers.o $(BUILD)/tests/
 	$(call say,link $@)
 	$(Q)$(CC) $(LDFLAGS) -o $@ $(filter %.o,$^) $(filter-out %.o,$^) $(LIBS) -lcmocka
 
-$(BUILD)/tests/test_ab_measure $(BUILD)/tests/test_ab_words: $(BUILD)/tests/fake_experiment.o
+$(addprefix $(BUILD)/tests/test_ab_,against json junit measure null words): $(BUILD)/tests/fake_experiment.o
 
 # They load the module; so does whatever writes PNG files.
-$(BUILD)/tests/test_image_file $(BUILD)/tests/test_sg_run $(BUILD)/tests/test_diff $(BUILD)/tests/test_ab_sheet $(BUILD)/tests/test_ab: | $(BUILD)/relit_oiio.so
+$(addprefix $(BUILD)/tests/test_,image_file sg_run diff ab_against ab_sheet ab): | $(BUILD)/relit_oiio.so
 
 test-build: all $(TESTS) $(BENCHES)
 

@@ -1,6 +1,6 @@
 """Drives real headless Chromium over WebDriver (Debian: chromium, chromium-driver), on pages of tests/page_make.c.
 
-    page_browser.py FOLDER [NAME…]       tests; a line each: "ok NAME" or "not ok NAME: why"
+    page_browser.py FOLDER [NAME…]       tests; a line each: "passed NAME" or "FAILED NAME: why"
     page_browser.py --shot FILE OUT.png WIDTH [HEIGHT] [dark] [SCRIPT]   a picture of a page, for people
 
 Exit status: 0 all passed, 1 some failed, 77 no browser can be started here. Nothing but the standard library.
@@ -389,7 +389,7 @@ def read_out(p):
     p.b.keys("1")
     box = p.canvas()
     x, y = 33, 70
-    at = (box["x"] + box["width"] / 2 + x - 80 + 0.5, box["y"] + box["height"] / 2 + y - 48 + 0.5)
+    at = (math.ceil(box["x"] + box["width"] // 2 + x - 80), math.ceil(box["y"] + box["height"] // 2 + y - 48))
     p.b.pointer(("move", *at))
     place = p.text("#readout .place")
     names = ["no material", "skin", "plaster", "wax"]
@@ -508,6 +508,9 @@ def light_and_dark(p):
 def phone(p):
     """360 pixels wide: nothing sticks out, controls are large enough, all of it works."""
     p.b.size(360, 740, 2, True)
+    p.open("evil.html")  # long names
+    width = p.b.js("return [document.documentElement.scrollWidth, innerWidth]")
+    check(width == [360, 360], f"the page with long names is {width} wide")
     p.open()
     over = p.b.js("""const w = document.documentElement.clientWidth; if (document.documentElement.scrollWidth <= w) return [];
         return [...document.querySelectorAll('body *')].filter(e => e.getBoundingClientRect().right > w + 1 && !e.closest('.scroll, nav')).map(e => e.tagName + '.' + e.className).slice(0, 5)""")
@@ -605,14 +608,14 @@ def run_tests(folder, names):
                     continue
                 started, why = time.time(), None
                 try:
-                    browser.size(760, 640)
+                    browser.size(720, 460)
                     browser.media(motion="reduce")
                     function(page)
                     run_quiet(page, function.__name__)
                 except (Check, RuntimeError) as error:
                     why = str(error).splitlines()[0]
                     status = 1
-                print(f"not ok {name}: {why}" if why else f"ok {name}", f"({time.time() - started:.1f} s)", flush=True)
+                print(f"FAILED {name}: {why}" if why else f"passed {name}", f"({time.time() - started:.1f} s)", flush=True)
         finally:
             browser.close()
     return status

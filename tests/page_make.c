@@ -53,7 +53,7 @@ static rl_code display(const void *ctx, float *r, float *g, float *b, size_t n, 
 
 double page_make_mean(int index, int pair)
 {
-    return (index == 3 ? 0.031 : 0.012 + 0.001 * index) * (1 + pair);
+    return (index == 3 ? 0.031 : 0.012 + 0.001 * index) / (1 + pair);
 }
 
 /* Of a frame: [variants + 1 reference][compared][3][N], ids, two maps. */

@@ -10,7 +10,9 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <signal.h>
 #include <string.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include "graph/run/image_file.h"
@@ -18,6 +20,7 @@
 #include "tests/tool_run.h"
 
 static char *folder, *pipe_file, *out;
+static char program[4096]; /* relit itself, beside the tests */
 
 static int setup(void **state)
 {
@@ -352,6 +355,51 @@ static void test_wrong(void **state)
     }
 }
 
+/* A signal ends the run after the frames in flight, and the report is of those that were compared. */
+static void test_signal(void **state)
+{
+    (void)state;
+    char *manifest = text_replace(small_manifest, "s.####.exr", "s.0001.exr"),
+         *many = text_replace(manifest, "1-3", "1-20000"), *said = path_in(folder, "said");
+    int results[2], status;
+    char c = 0;
+    file_write(folder, "capture.yaml", many, strlen(many));
+    assert_int_equal(pipe(results), 0);
+    fflush(NULL);
+    pid_t pid = fork();
+    assert_true(pid >= 0);
+    if (!pid) {
+        dup2(results[1], 1);
+        close(results[0]);
+        if (freopen(said, "w", stderr))
+            execl(program, "relit", "ab", pipe_file, "--vary", "graph.sss.taps=21,4", "--seeds", "1", "--out",
+                  out, "--json", "--only", "beauty", (char *)NULL);
+        _exit(127);
+    }
+    close(results[1]);
+    for (int lines = 0; lines < 2;) { /* two frames, then the signal, then the rest */
+        assert_int_equal(read(results[0], &c, 1), 1);
+        lines += c == '\n';
+    }
+    kill(pid, SIGTERM);
+    while (read(results[0], &c, 1) == 1)
+        ;
+    close(results[0]);
+    assert_int_equal(waitpid(pid, &status, 0), pid);
+    assert_true(WIFSIGNALED(status) && WTERMSIG(status) == SIGTERM);
+    size_t size;
+    char *text = file_read(said, &size);
+    expect_in(text, "the others were not begun\n"); /* --resume is not for this command */
+    json_t *root = metrics();
+    assert_true(mean_of(root, 0, 2, "flip") > 0 && isnan(mean_of(root, 0, 20000, "flip")));
+    assert_true(is_there("report.html"));
+    json_decref(root);
+    free(text);
+    free(said);
+    free(manifest);
+    free(many);
+}
+
 /* ---- other results ------------------------------------------------------------------------------------- */
 
 static void test_sheet(void **state)
@@ -422,7 +470,7 @@ static void test_default_folder(void **state)
     free(back);
     expect(&r, 0);
     expect_in(r.out, "\nout/ab/report.html\n");
-    assert_true(is_there("ab/metrics.json") && is_there("ab/4/s.0001.exr"));
+    assert_true(is_there("ab/metrics.json") && is_there("ab/taps_4/s.0001.exr"));
     tool_result_free(&r);
 }
 
@@ -441,9 +489,11 @@ static void test_plan(void **state)
     assert_int_equal(sscanf(cost, "2 variants = %lfx one (%lfx one after the other)", &factor, &one_by_one),
                      2);
     assert_true(factor > 1 && factor < one_by_one && one_by_one > 1.5 && one_by_one < 3);
-    expect_in(r.out, "  4   ");
+    expect_in(r.out, "  taps_4   ");
     expect_in(r.out, "light             lighting    all\n");
-    expect_in(r.out, "sss@2             sss_burley  21\n");
+    expect_in(r.out, "sss@2             sss_burley  taps_21\n");
+    expect_in(r.out,
+              "output.preview@2  color       taps_21\n"); /* shown, and compared: still one variant's */
     tool_result_free(&r);
     r = PLAN("--format", "json");
     expect(&r, 0);
@@ -467,7 +517,7 @@ static void test_plan_drawn(void **state)
     (void)state;
     tool_result r = PLAN("--format", "dot");
     expect(&r, 0);
-    expect_in(r.out, "label=\"2. sss\\nsss_burley\\n4\"");
+    expect_in(r.out, "label=\"2. sss\\nsss_burley\\ntaps_4\"");
     expect_in(r.out, "fillcolor");
     assert_null(strstr(r.out, "lighting\\n")); /* shared: not marked */
     tool_result_free(&r);
@@ -480,13 +530,17 @@ static void test_plan_drawn(void **state)
 
 #define TEST(name) cmocka_unit_test_setup_teardown(name, setup, teardown)
 
-int main(int argc, char **argv)
+int main(void)
 {
-    tool_child(argc, argv);
+    ssize_t n = readlink("/proc/self/exe", program, sizeof program - 16);
+    program[n > 0 ? n : 0] = 0;
+    for (int i = 0; i < 2 && strrchr(program, '/'); i++) /* BUILD/tests/test_ab -> BUILD */
+        *strrchr(program, '/') = 0;
+    strcat(program, "/relit");
     const struct CMUnitTest tests[] = {
-        TEST(test_grid),           TEST(test_pipelines), TEST(test_against),    TEST(test_over),
-        TEST(test_failed_frame),   TEST(test_wrong),     TEST(test_sheet),      TEST(test_json),
-        TEST(test_default_folder), TEST(test_plan),      TEST(test_plan_drawn),
+        TEST(test_grid),         TEST(test_pipelines),      TEST(test_against), TEST(test_over),
+        TEST(test_failed_frame), TEST(test_wrong),          TEST(test_signal),  TEST(test_sheet),
+        TEST(test_json),         TEST(test_default_folder), TEST(test_plan),    TEST(test_plan_drawn),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

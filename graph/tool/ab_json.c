@@ -101,6 +101,16 @@ static void variants_json(const rl_ab_report *r, rl_str *out)
     rl_str_add(out, "],\n");
 }
 
+/* "aa.color, linear Rec. 709" */
+static void image_json(const rl_ab_report *r, const char *space, rl_str *out)
+{
+    rl_str text = {0};
+    rl_str_printf(&text, "%s, %s", rl_experiment_image_name(r->experiment, 0, RL_COMPARED_LINEAR), space);
+    rl_ab_json_text(out, rl_str_text(&text));
+    out->failed = out->failed || text.failed;
+    rl_str_free(&text);
+}
+
 static void pairs_json(const rl_ab_report *r, rl_str *out)
 {
     rl_str_add(out, " \"pairs\": [");
@@ -115,16 +125,10 @@ static void pairs_json(const rl_ab_report *r, rl_str *out)
     }
     rl_str_add(out, "],\n \"against\": ");
     text_or_null(out, r->plan->against);
-    rl_str text = {0};
-    const char *name = rl_experiment_image_name(r->experiment, 0, RL_COMPARED_LINEAR);
-    rl_str_printf(&text, "%s, linear Rec. 709", name);
     rl_str_add(out, ",\n \"images\": {\"linear\": ");
-    rl_ab_json_text(out, rl_str_text(&text));
-    rl_str_free(&text);
-    rl_str_printf(&text, "%s, %s", name, rl_experiment_image_name(r->experiment, 0, RL_COMPARED_DISPLAY));
+    image_json(r, "linear Rec. 709", out);
     rl_str_add(out, ", \"display\": ");
-    rl_ab_json_text(out, rl_str_text(&text));
-    rl_str_free(&text);
+    image_json(r, rl_experiment_image_name(r->experiment, 0, RL_COMPARED_DISPLAY), out);
     rl_str_add(out, "},\n");
 }
 

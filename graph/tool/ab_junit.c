@@ -1,6 +1,7 @@
 #include "graph/tool/ab_junit.h"
 
 #include <jansson.h>
+#include <stdio.h>
 #include <string.h>
 #include <time.h>
 
@@ -59,7 +60,14 @@ typedef struct suite {
     size_t tests, failures, errors;
     double seconds; /* of a testcase */
     rl_str *out;    /* NULL: count only */
+    bool failed;    /* memory ran out */
 } suite;
+
+static void release(suite *s, rl_str *text)
+{
+    s->failed = s->failed || text->failed;
+    rl_str_free(text);
+}
 
 static void open_case(suite *s, const char *class, const char *name)
 {
@@ -111,10 +119,9 @@ static void add_failure(suite *s, const rl_ab_verdict *v, int pair, int material
             rl_str_printf(&text, "and %zu more\n", n - MOST_FRAMES);
         add_text(s->out, rl_str_text(&text));
         rl_str_add(s->out, "</failure>");
-        s->out->failed = s->out->failed || message.failed || text.failed;
-        rl_str_free(&message);
+        release(s, &message);
     }
-    rl_str_free(&text);
+    release(s, &text);
 }
 
 /* Did a frame of the capture show the material? All of them together are there when any is. */
@@ -138,7 +145,7 @@ static void add_class(const suite *s, size_t pair, rl_str *out)
 
 static void threshold_cases(suite *s, size_t pair, const rl_ab_verdict *v)
 {
-    rl_str class = {0}, name = {0};
+    rl_str class = {0};
     char what[32];
     size_t n;
     rl_experiment_materials(s->r->experiment, s->capture, &n);
@@ -147,17 +154,15 @@ static void threshold_cases(suite *s, size_t pair, const rl_ab_verdict *v)
         const char *material = rl_ab_material_name(s->r, s->capture, m);
         if (m == 0 || !was_seen(s, pair, m))
             continue;
-        rl_str_free(&name);
+        rl_str name = {0};
         rl_str_printf(&name, "%s of %s", rl_threshold_name(&v->threshold, what),
                       material ? material : "all materials");
         open_case(s, rl_str_text(&class), rl_str_text(&name));
         add_failure(s, v, (int)pair, m);
         close_case(s);
+        release(s, &name);
     }
-    if (s->out)
-        s->out->failed = s->out->failed || class.failed || name.failed;
-    rl_str_free(&class);
-    rl_str_free(&name);
+    release(s, &class);
 }
 
 static void pair_case(suite *s, size_t pair)
@@ -166,9 +171,7 @@ static void pair_case(suite *s, size_t pair)
     add_class(s, pair, &class);
     open_case(s, rl_str_text(&class), "compared");
     close_case(s);
-    if (s->out)
-        s->out->failed = s->out->failed || class.failed;
-    rl_str_free(&class);
+    release(s, &class);
 }
 
 /* Energy is of variants, not of pairs: one testcase for all of a capture. */
@@ -189,12 +192,11 @@ static void energy_case(suite *s, const rl_ab_verdict *v)
         }
         if (n > MOST_FRAMES)
             rl_str_printf(&text, "and %zu more\n", n - MOST_FRAMES);
-        rl_str_printf(s->out, "<failure type=\"threshold\" message=\"energy over %g in %zu places\">",
-                      v->threshold.limit, n);
+        rl_str_printf(s->out, "<failure type=\"threshold\" message=\"energy over %g in %zu place%s\">",
+                      v->threshold.limit, n, n == 1 ? "" : "s");
         add_text(s->out, rl_str_text(&text));
         rl_str_add(s->out, "</failure>");
-        s->out->failed = s->out->failed || text.failed;
-        rl_str_free(&text);
+        release(s, &text);
     }
     close_case(s);
 }
@@ -270,6 +272,7 @@ static void add_suite(const rl_ab_report *r, size_t capture, size_t frames, rl_s
     rl_str_add(out, "</properties>\n");
     s.out = out;
     all_cases(&s);
+    out->failed = out->failed || s.failed;
     rl_str_add(out, "    <system-out>");
     add_text(out, r->summary ? r->summary : "");
     rl_str_add(out, "</system-out>\n    <system-err></system-err>\n  </testsuite>\n");

@@ -226,10 +226,9 @@ rl_code rl_ab_measure_frame(rl_ab_measure *m, const rl_experiment_frame *frame, 
     for (size_t i = 0; !code && i < m->n_groups; i++)
         code = measure_group(m, frame, &m->groups[i], err);
     if (code) { /* as if the frame had not been */
-        m->n_values = before;
         memset(m->measured, 0, m->plan->n_pairs * RL_METRICS * sizeof *m->measured);
         if (m->n_nulls)
-            memcpy(m->nulls, m->nulls_before, m->n_nulls * sizeof *m->nulls);
+            memcpy(m->nulls_before, m->nulls, m->n_nulls * sizeof *m->nulls);
         return code;
     }
     if (m->n_values > before)

@@ -62,7 +62,9 @@ typedef struct rl_ab_page_input {
     /* The metric's map of a pair in this frame, width · height values, or NULL. */
     const float *(*map)(const void *ctx, size_t pair, rl_metric metric);
     const void *ctx;
-    const rl_compared_image *reference; /* --against: [RL_COMPARED]; else NULL */
+    /* --against: [RL_COMPARED], plane[0] of one that does not exist NULL (a DISPLAY one alone is decoded from
+     * sRGB for the page); else NULL. */
+    const rl_compared_image *reference;
 } rl_ab_page_input;
 
 /* Frames may come in any order. An error leaves the page as it was before. */

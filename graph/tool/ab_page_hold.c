@@ -5,12 +5,14 @@
 #include "graph/base/alloc.h"
 #include "graph/run/exr_core.h"
 #include "graph/tool/ab_page_parts.h"
+#include "graph/tool/metric_color.h"
 
 const rl_metric rl_page_maps[RL_PAGE_MAPS] = {RL_METRIC_FLIP, RL_METRIC_HDRFLIP};
 
 /* One block of a frame: packed by any thread of the pool. */
 typedef struct job {
     const rl_compared_image *image; /* half floats; or */
+    bool encoded;                   /* the image is: it is decoded from sRGB */
     const float *map;               /* 0 … 1; or */
     const uint32_t *ids;
     size_t stride;
@@ -20,13 +22,22 @@ typedef struct job {
     rl_error error;
 } job;
 
-static void fill_halves(const job *j, uint16_t *out)
+static rl_code fill_halves(const job *j, uint16_t *out, rl_error *err)
 {
     const rl_exr_kernels *kernels = rl_exr_kernels_best();
     size_t width = (size_t)j->width;
+    float *row = rl_malloc(width * sizeof *row);
+    if (!row)
+        return rl_fail_memory(err, width * sizeof *row);
     for (int c = 0; c < 3; c++)
-        for (size_t y = 0; y < (size_t)j->height; y++, out += width)
-            kernels->float_to_half(j->image->plane[c] + y * j->image->stride, out, width);
+        for (size_t y = 0; y < (size_t)j->height; y++, out += width) {
+            const float *in = j->image->plane[c] + y * j->image->stride;
+            for (size_t x = 0; j->encoded && x < width; x++)
+                row[x] = (float)rl_srgb_decode((double)in[x]);
+            kernels->float_to_half(j->encoded ? row : in, out, width);
+        }
+    rl_free(row);
+    return RL_OK;
 }
 
 static void fill_map(const job *j, uint8_t *out)
@@ -61,13 +72,14 @@ static void pack_job(void *ctx, int i)
         return;
     }
     if (j->image)
-        fill_halves(j, data);
+        fill_halves(j, data, &j->error);
     else if (j->map)
         fill_map(j, data);
     else
         fill_ids(j, data);
     rl_page_plain plain = {j->bits, j->planes, j->width, j->height, data};
-    rl_page_pack(&plain, &j->packed, &j->size, &j->error);
+    if (!j->error.code)
+        rl_page_pack(&plain, &j->packed, &j->size, &j->error);
     rl_free(data);
 }
 
@@ -92,10 +104,13 @@ static void list_jobs(const rl_ab_page *page, const rl_ab_page_input *input, job
     for (size_t i = 0; i <= listed; i++) {
         jobs[i].bits = 16;
         jobs[i].planes = 3;
-        jobs[i].image = i < listed         ? &f->images[i][RL_COMPARED_LINEAR]
-                        : input->reference ? &input->reference[RL_COMPARED_LINEAR]
-                                           : NULL;
+        jobs[i].image = i < listed ? &f->images[i][RL_COMPARED_LINEAR] : NULL;
     }
+    for (int k = RL_COMPARED; input->reference && k-- > 0;)
+        if (input->reference[k].plane[0]) { /* LINEAR is looked at last, and is better */
+            jobs[listed].image = &input->reference[k];
+            jobs[listed].encoded = k == RL_COMPARED_DISPLAY;
+        }
     job *ids = &jobs[listed + 1];
     ids->stride = f->stencil_stride;
     ids->bits = f->stencil ? id_bits(f) : 0;
@@ -155,6 +170,7 @@ rl_code rl_page_hold(rl_ab_page *page, const rl_ab_page_input *input, rl_page_he
     }
     if (!code)
         code = store(page, jobs, n, out, err);
+    out->encoded = jobs[page->plan->n_listed].encoded;
 done:
     for (size_t i = 0; jobs && i < n; i++)
         rl_free(jobs[i].packed);

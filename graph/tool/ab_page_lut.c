@@ -23,7 +23,9 @@ static double from_axis(const rl_page_lut *lut, double t)
 void rl_page_lut_free(rl_page_lut *lut)
 {
     rl_free(lut->entries);
+    rl_free(lut->packed);
     lut->entries = NULL;
+    lut->packed = NULL;
 }
 
 /* The colours of the entries, planes of n³. */
@@ -66,7 +68,8 @@ rl_code rl_page_lut_bake(const rl_ab_page_display *display, rl_page_lut *out, rl
         out->entries[i] = (uint16_t)lrint((v - out->low) / (out->high - out->low) * 65535);
     }
     rl_free(planes);
-    return code;
+    const rl_page_plain plain = {16, 3, N, N * N, out->entries};
+    return code ? code : rl_page_pack(&plain, &out->packed, &out->size, err);
 }
 
 /* Kasson et al. 1995: a cube is six tetrahedra around its grey diagonal; which one a point is in follows from

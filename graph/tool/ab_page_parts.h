@@ -46,6 +46,8 @@ typedef struct rl_page_lut {
     double knee, first, last; /* scene-linear; what lies outside is moved to the end */
     double low, high;         /* encoded values */
     uint16_t *entries;        /* [3 · n³], owned */
+    uint8_t *packed;          /* the same as a block, owned */
+    size_t size;
     /* |table - display|, both clamped to 0 … 1, over pixels that were compared. */
     double error_max, error_sum;
     unsigned long long pixels;
@@ -105,6 +107,7 @@ rl_code rl_page_spool_read(const rl_page_spool *spool, off_t at, void *data, siz
 typedef struct rl_page_held {
     size_t seen; /* the frame: index into page->seen */
     unsigned why;
+    bool encoded; /* the reference has no scene-linear image: it was decoded from sRGB */
     rl_page_extent extent;
     /* An image a variant, the reference, the ids of the materials, then for each pair its maps. */
     rl_page_block *blocks; /* owned; size 0: absent */

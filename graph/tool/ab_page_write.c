@@ -11,9 +11,10 @@
 #include "graph/tool/ab_page_parts.h"
 #include "graph/tool/heatmap.h"
 
-/* Where the file goes; the first error of the stream stays in it. */
+/* Where the file goes. Errors of the stream stay in it until the end. */
 typedef struct writer {
     FILE *file;
+    bool *out_of_memory;
     rl_ab_page *page;
     json_t *metrics;
     const char *metrics_text;
@@ -23,6 +24,13 @@ typedef struct writer {
 static void put(const writer *w, const char *text)
 {
     fputs(text, w->file);
+}
+
+static void put_text(const writer *w, rl_str *s)
+{
+    put(w, rl_str_text(s));
+    *w->out_of_memory |= s->failed;
+    rl_str_free(s);
 }
 
 static void put_number(rl_str *s, double value)
@@ -78,7 +86,7 @@ static void add_held(const writer *w, rl_str *s, const rl_page_held *held, size_
     }
     rl_str_add(s, "],\"reference\":");
     add_block(s, &b[listed], id + listed);
-    rl_str_add(s, ",\"ids\":");
+    rl_str_printf(s, ",\"encoded\":%s,\"ids\":", held->encoded ? "true" : "false");
     add_block(s, &b[listed + 1], id + listed + 1);
     rl_str_add(s, ",\"maps\":[");
     for (size_t i = listed + 2; i < held->n_blocks; i++) {
@@ -169,11 +177,7 @@ static void put_page(const writer *w)
     add_heat(&s);
     add_frames(w, &s);
     rl_str_add(&s, "}\n");
-    if (s.failed)
-        errno = ENOMEM;
-    else
-        put(w, rl_str_text(&s));
-    rl_str_free(&s);
+    put_text(w, &s);
 }
 
 /* ---- blocks -------------------------------------------------------------------------------------------- */
@@ -190,19 +194,6 @@ static rl_code put_block(const writer *w, size_t id, const uint8_t *data, size_t
     put(w, "</script>\n");
     rl_free(text);
     return RL_OK;
-}
-
-static rl_code put_lut(const writer *w, size_t i, rl_error *err)
-{
-    const rl_page_lut *lut = &w->page->luts[i];
-    rl_page_plain plain = {16, 3, lut->n, lut->n * lut->n, lut->entries};
-    uint8_t *packed = NULL;
-    size_t size = 0;
-    rl_code code = rl_page_pack(&plain, &packed, &size, err);
-    if (!code)
-        code = put_block(w, i, packed, size, err);
-    rl_free(packed);
-    return code;
 }
 
 static rl_code put_held(const writer *w, const rl_page_held *held, size_t id, rl_error *err)
@@ -228,7 +219,7 @@ static rl_code put_blocks(const writer *w, rl_error *err)
     size_t id = page->source->n_displays;
     rl_code code = RL_OK;
     for (size_t i = 0; i < page->source->n_displays && !code; i++)
-        code = put_lut(w, i, err);
+        code = put_block(w, i, page->luts[i].packed, page->luts[i].size, err);
     for (size_t i = 0; i < page->n_seen && !code; i++) {
         if (!w->order[i])
             continue;
@@ -259,10 +250,7 @@ static void put_html(const writer *w, const char *text)
 {
     rl_str s = {0};
     rl_page_html_text(&s, text);
-    if (s.failed)
-        errno = ENOMEM;
-    put(w, rl_str_text(&s));
-    rl_str_free(&s);
+    put_text(w, &s);
 }
 
 /* In JSON, '<' is in strings only: "</script>" and "<!--" cannot end or change the element around it. */
@@ -281,10 +269,14 @@ static void put_metrics(const writer *w)
 
 static void put_title(const writer *w)
 {
-    for (size_t v = 0; v < w->page->plan->n_listed; v++) {
-        put(w, v ? " · " : "");
+    enum { MOST = 4 };
+    size_t n = w->page->plan->n_listed, named = n > MOST ? MOST - 1 : n;
+    for (size_t v = 0; v < named; v++) {
+        put(w, v ? "\xc2\xa0· " : "");
         put_html(w, w->page->plan->variants[v].name);
     }
+    if (named < n)
+        fprintf(w->file, " and %zu more", n - named);
 }
 
 static rl_code put_part(const writer *w, const char *name, size_t n, rl_error *err)
@@ -330,17 +322,19 @@ static rl_code write_file(writer *w, const char *path, unsigned long long *bytes
     rl_code code = rl_file_temp(path, temp, sizeof temp, err);
     if (code)
         return code;
-    errno = 0;
+    bool out_of_memory = false;
+    w->out_of_memory = &out_of_memory;
     w->file = fopen(temp, "wbe");
     if (!w->file)
         return rl_fail_file(err, RL_E_IO, path, "cannot be written: %s", strerror(errno));
     code = put_all(w, err);
     long size = ftell(w->file);
-    bool bad = ferror(w->file) || errno == ENOMEM;
+    bool bad = ferror(w->file) || size < 0;
     bad |= fclose(w->file) != 0;
+    if (!code && out_of_memory)
+        code = rl_fail_memory(err, 4096);
     if (!code && bad)
-        code = errno == ENOMEM ? rl_fail_memory(err, 4096)
-                               : rl_fail_file(err, RL_E_IO, path, "cannot be written: %s", strerror(errno));
+        code = rl_fail_file(err, RL_E_IO, path, "cannot be written: %s", strerror(errno));
     *bytes = size > 0 ? (unsigned long long)size : 0;
     if (!code)
         return rl_file_commit(temp, path, err);
@@ -348,18 +342,16 @@ static rl_code write_file(writer *w, const char *path, unsigned long long *bytes
     return code;
 }
 
-/* What is in the page besides frames; tables are a quarter smaller than this once packed. */
+/* What is in the page besides frames, a little more than less. */
 static unsigned long long fixed_bytes(const rl_ab_page *page, const char *metrics)
 {
     unsigned long long bytes = strlen(metrics) + 4096;
     for (const rl_embedded_text *e = rl_embedded_page; e->name; e++)
         bytes += strlen((const char *)e->text);
-    for (size_t i = 0; i < page->source->n_displays; i++) {
-        size_t n = (size_t)page->luts[i].n;
-        bytes += rl_page_base64_size(6 * n * n * n);
-    }
+    for (size_t i = 0; i < page->source->n_displays; i++)
+        bytes += rl_page_base64_size(page->luts[i].size) + 256;
     for (size_t i = 0; i < page->n_seen; i++)
-        bytes += 96 + page->seen[i].files.length + page->seen[i].error.length;
+        bytes += 512 + page->seen[i].files.length + page->seen[i].error.length;
     return bytes;
 }
 

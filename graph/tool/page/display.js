@@ -39,9 +39,10 @@ function srgbFunction(r, g, b, out) {
   out[2] = clamp(srgbEncode(b), 0, 1);
 }
 
-/* What state.display asks for, for a variant (-1: the reference, shown as the first variant is): a promise of
- * {lut, entries, apply}; lut null for sRGB. */
-async function displayFor(page, name, variant) {
+/* What state.display asks for, for a variant (-1: the reference, shown as the first variant is, or as it was
+ * encoded): a promise of {lut, entries, apply}; lut null for sRGB. */
+async function displayFor(page, frame, name, variant) {
+  if (variant < 0 && frame.encoded) name = "srgb"; /* it was never scene-linear */
   if (name !== "pipeline" || !page.displays.length) return {lut: null, entries: null, apply: srgbFunction};
   const lut = page.displays[page.displayOf[Math.max(variant, 0)]];
   if (!lut.apply) {

@@ -59,7 +59,10 @@ class GraphView {
     }
   }
 
-  width(n) { return Math.max(104, 26 + 7.6 * Math.max(n.name.length, (n.pass || "").length * 0.88 + 4)); }
+  width(n) {
+    const ms = typeof n.ms === "number" ? 5 : 0;
+    return Math.max(104, 26 + 7.6 * Math.max(n.name.length + ms, (n.pass || "").length * 0.88));
+  }
 
   /* Left to right where there is room, else from the top down. */
   draw(wide) {

@@ -75,8 +75,11 @@ void main() {
     return;
   }
   float reach = 1.0 / scale;
-  vec3 l = linear(leftImage, leftSize, p, reach) * gain, r = linear(rightImage, rightSize, p, reach) * gain;
-  vec3 c = isLeft ? shown(leftTable, leftAxis, leftRange, l) : shown(rightTable, rightAxis, rightRange, r);
+  vec3 l = vec3(0), r = vec3(0), c;
+  if (isLeft || overlay == 2) l = linear(leftImage, leftSize, p, reach) * gain;
+  if (!isLeft || overlay == 2) r = linear(rightImage, rightSize, p, reach) * gain;
+  if (isLeft) c = shown(leftTable, leftAxis, leftRange, l);
+  else c = shown(rightTable, rightAxis, rightRange, r);
   if (overlay != 0) {
     vec3 d = abs(l - r);
     float t = overlay == 1 ? linear(map, textureSize(map, 0), p, reach).r : clamp(max(d.r, max(d.g, d.b)), 0.0, 1.0);

@@ -4,7 +4,7 @@ class Sections {
   constructor(metrics, page, viewer) {
     Object.assign(this, {metrics, page, viewer});
     this.measures = new Measures(metrics);
-    this.state = {capture: 0, pair: 0, stat: "mean"};
+    this.state = {capture: 0, pair: worstPair(metrics), stat: "mean"};
     this.hidden = new Set(); /* materials that the plots leave out */
     this.heldFrames = capture => new Set(viewer.held.filter(f => f.capture === capture).map(f => f.frame));
   }
@@ -85,21 +85,31 @@ class Sections {
     const pair = this.metrics.pairs[st.pair], noisy = (this.metrics.null || []).length > 0;
     const words = (this.metrics.pairs.length === 1 ? pairName(this.metrics, pair) + ". " : "") +
       (frames.length > 1 ? "The mean over frames, and below it the worst frame. " : "") +
-      (noisy ? "A dot marks what chance alone does not make" + (this.metrics.seeds ? ` (${plural(this.metrics.seeds, "seed")} of ${this.metrics.variants[0].name})` : "") + "."
-             : this.metrics.stochastic ? "Some pass is stochastic, and no seeds were compared: small differences may be chance." : "");
+      (noisy ? this.chanceWords() : this.metrics.stochastic ? "Some pass is stochastic, and no seeds were compared: small differences may be chance." : "");
     this.box.replaceChildren(h("p", {class: "small"}, words),
       metricTable(this.measures, st, color, (...a) => this.show(...a)),
       frames.length > 1 ? this.lines(frames, materials, names, color) : "", materials.length > 1 ? this.bars(materials, names, color) : "");
   }
 
+  chanceWords() {
+    const m = this.metrics, rate = m.false_positives;
+    return `A dot marks what is beyond chance: beyond all that other seeds of ${m.variants[0].name} make` + (m.seeds ? ` (${m.seeds} seeds)` : "") + "." +
+      (rate > 0 ? ` Without a cause, a material and metric gets one in at most 1 of ${Math.round(1 / rate)} runs.` : "");
+  }
+
   lines(frames, materials, names, color) {
     const st = this.state, held = this.heldFrames(st.capture), plots = h("div", {class: "multiples"});
     const legend = h("div", {class: "legend", role: "group", "aria-label": "Materials in the plots"});
-    const draw = () => plots.replaceChildren(...names.map(metric => new LinePlot({metric, frames, held,
-      pick: f => this.show(st.capture, f, st.pair, metric),
-      series: materials.map((m, i) => ({m, name: materialName(m), color: color(i), main: m === null, bound: this.measures.bound(st.capture, m, metric, st.stat),
-        values: new Map(this.measures.rows(st.capture, st.pair, m, metric).map(r => [r.frame, r[st.stat]]))}))
-        .filter(x => !this.hidden.has(x.m)).reverse()}).element));
+    const chance = h("span");
+    const draw = () => {
+      const seen = materials.filter(m => !this.hidden.has(m)), main = seen.includes(null) || seen.length !== 1 ? null : seen[0];
+      chance.textContent = `what chance makes, ${materialName(main)}`;
+      plots.replaceChildren(...names.map(metric => new LinePlot({metric, frames, held,
+        pick: f => this.show(st.capture, f, st.pair, metric),
+        series: materials.map((m, i) => ({m, name: materialName(m), color: color(i), main: m === main, bound: this.measures.bound(st.capture, m, metric, st.stat),
+          values: new Map(this.measures.rows(st.capture, st.pair, m, metric).map(r => [r.frame, r[st.stat]]))}))
+          .filter(x => seen.includes(x.m)).reverse()}).element));
+    };
     materials.forEach((m, i) => {
       const button = h("button", {type: "button", "aria-pressed": String(!this.hidden.has(m)), onclick: () => {
         if (!this.hidden.delete(m)) this.hidden.add(m);
@@ -108,14 +118,15 @@ class Sections {
       }}, h("i", {class: "swatch", style: {background: color(i)}}), materialName(m));
       legend.append(button);
     });
-    if ((this.metrics.null || []).length) legend.append(h("span", {class: "small"}, h("i", {class: "key chance"}), "what chance makes, all materials"));
+    if ((this.metrics.null || []).length) legend.append(h("span", {class: "small"}, h("i", {class: "key chance"}), chance));
     draw();
     return h("div", {}, h("h3", {}, "Over frames"), legend, plots);
   }
 
   bars(materials, names, color) {
     const st = this.state;
-    return h("div", {}, h("h3", {}, "By material"), h("div", {class: "multiples"}, names.map(metric => barPlot(metric, materials.map((m, i) => {
+    const noisy = (this.metrics.null || []).length > 0;
+    return h("div", {}, h("h3", {}, "By material"), noisy ? h("p", {class: "small"}, h("i", {class: "key limit-key"}), "what chance makes, that material") : null, h("div", {class: "multiples"}, names.map(metric => barPlot(metric, materials.map((m, i) => {
       const o = this.measures.over(st.capture, st.pair, m, metric, st.stat);
       return {name: materialName(m), color: color(i), value: o.mean, bound: this.measures.bound(st.capture, m, metric, st.stat), beyond: o.beyond > 0};
     })))));
@@ -173,11 +184,13 @@ class Sections {
     if (!c) return null;
     const n = c.variants || this.metrics.variants.length, bars = [["one variant", 1, ""], [`these ${n}, together`, c.factor, "main"], [`these ${n}, one after the other`, c.sum, ""]]
       .filter(b => typeof b[1] === "number"), most = Math.max(...bars.map(b => b[1]));
+    const extra = n - this.metrics.variants.length;
     const predicted = typeof c.predicted === "number" ? `, predicted ${fixed(c.predicted, 2)}\u00d7` : "";
     const nodes = (this.metrics.graph || []).flatMap(g => g.nodes).filter(x => typeof x.ms === "number").sort((a, b) => b.ms - a.ms), total = nodes.reduce((t, x) => t + x.ms, 0);
     return this.section("cost", "Cost",
       h("p", {}, `${plural(n, "variant")} = ${fixed(c.factor, 2)}\u00d7 one (${c.measured ? "measured" : "predicted"}${predicted})` +
-        (c.frames ? `; ${plural(c.frames, "frame")}` : "") + (typeof c.seconds === "number" ? ` in ${number(c.seconds)}\u00a0s` : "") + "."),
+        (c.frames ? `; ${plural(c.frames, "frame")}` : "") + (typeof c.seconds === "number" ? ` in ${number(c.seconds)}\u00a0s` : "") + "." +
+        (extra > 0 ? ` ${extra} of them are for chance alone.` : "")),
       h("div", {class: "multiples"}, h("figure", {class: "multiple bars"}, h("figcaption", {}, "Against one variant"), h("dl", {}, bars.map(([name, v, cls]) => [
         h("dt", {}, name), h("dd", {}, h("span", {class: "track"}, h("span", {class: "fill " + cls, style: {width: v / most * 100 + "%"}})), h("span", {class: "value"}, fixed(v, 2) + "\u00d7"))]))),
       nodes.length ? h("figure", {class: "multiple bars"}, h("figcaption", {}, "Nodes", h("small", {}, ` ${number(total)} ms a frame`)), h("dl", {}, nodes.slice(0, 12).map(x => [

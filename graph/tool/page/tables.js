@@ -46,9 +46,11 @@ class Measures {
 }
 
 const pairName = (metrics, pair) => {
-  const name = i => (i === null || i < 0 ? (metrics.against ? "reference" : "reference") : (metrics.variants[i] || {}).name || `variant ${i + 1}`);
+  const name = i => (i === null || i < 0 ? "the reference" : (metrics.variants[i] || {}).name || `variant ${i + 1}`);
   return `${name(pair.test)} against ${name(pair.reference)}`;
 };
+
+const isDifference = (metric, v) => (metric === "ssim" ? v < 1 : metric === "psnr" ? Number.isFinite(v) : v > 0);
 
 /* Rows of materials, columns of metrics. `show(frame)` opens one in the viewer, when it is held. */
 function metricTable(measures, {capture, pair, stat}, color, show) {
@@ -61,7 +63,7 @@ function metricTable(measures, {capture, pair, stat}, color, show) {
     return h("td", {},
       h("span", {class: "number"}, number(o.mean)),
       o.beyond ? h("b", {class: "beyond", title: chance}, "\u25cf", h("span", {class: "hidden"}, ` (${chance})`)) : null,
-      many ? h("button", {type: "button", class: "link", title: `worst: ${number(o.worst[stat])} at frame ${o.worst.frame}`,
+      many && isDifference(metric, o.worst[stat]) ? h("button", {type: "button", class: "link", title: `worst: ${number(o.worst[stat])} at frame ${o.worst.frame}`,
                           onclick: () => show(capture, o.worst.frame, pair, metric)}, `${number(o.worst[stat])} @${THIN}${o.worst.frame}`) : null);
   };
   return h("div", {class: "scroll", tabindex: 0, role: "region", "aria-label": "Table of the metrics"}, h("table", {class: "metrics"},

@@ -30,7 +30,7 @@ function number(x, digits = 3) {
   const size = Math.abs(x);
   let text;
   if (size === 0) text = "0";
-  else if (size >= 1e6 || size < 1e-4) text = x.toExponential(digits - 1).replace("e+", "e");
+  else if (size >= 1e6 || size < 1e-4) text = x.toExponential(Math.min(digits - 1, 1)).replace("e+", "e");
   else text = x.toFixed(clamp(digits - 1 - Math.floor(Math.log10(size)), 0, 8));
   return text.replace(/-/g, MINUS);
 }
@@ -38,7 +38,7 @@ function number(x, digits = 3) {
 /* A fixed number of decimals, for columns of pixels. */
 const fixed = (x, n) => (x === null || !Number.isFinite(x) ? NONE : x.toFixed(n).replace("-", MINUS));
 
-const METRIC_NAMES = {flip: "FLIP", hdrflip: "HDR-FLIP", psnr: "PSNR", ssim: "SSIM", rmse: "RMSE", max: "Max"};
+const METRIC_NAMES = {flip: "FLIP", hdrflip: "HDR-FLIP", psnr: "PSNR", ssim: "SSIM", rmse: "RMSE", max: "Max diff"};
 const METRIC_UNITS = {psnr: "dB"};
 const METRIC_HELP = {
   flip: "perceived difference of the display images, 0 to 1 (Andersson et al. 2020)",

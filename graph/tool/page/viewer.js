@@ -8,6 +8,16 @@ const MODES = [
 const EXPOSURES = {low: -8, high: 8, step: 0.25};
 const ZOOMS = {low: 1 / 16, high: 64};
 
+/* Beyond 1, a pixel of the picture is a square of whole pixels; between 1 and 2 only where they are not fine. */
+const wholeScale = (scale, ratio) => (scale >= 2 || (scale > 1 && ratio < 2) ? Math.floor(scale + 1e-6) : scale);
+
+/* The pair that differs most by FLIP, in a frame (all frames when that is undefined): its index. */
+function worstPair(metrics, frame) {
+  const rows = metrics.metrics.filter(r => r.metric === "flip" && r.material === null && typeof r.mean === "number" &&
+                                           (!frame || (r.capture === frame.capture && r.frame === frame.frame)));
+  return rows.length ? rows.reduce((w, r) => (r.mean > w.mean ? r : w)).pair : 0;
+}
+
 class Viewer {
   constructor(root, metrics, page) {
     this.root = root;
@@ -17,8 +27,8 @@ class Viewer {
     this.variants = metrics.variants || [];
     this.loaded = null; /* what is drawn: pictures, map, ids */
     this.ticket = 0;
-    const pair = (metrics.pairs || [])[0] || {reference: 0, test: Math.min(1, this.variants.length - 1)};
-    this.state = {frame: this.firstFrame(), a: pair.reference === null ? -1 : pair.reference, b: pair.test,
+    const frame = this.firstFrame(), pair = metrics.pairs[worstPair(metrics, this.held[frame])] || {reference: 0, test: Math.min(1, this.variants.length - 1)};
+    this.state = {frame, a: pair.reference === null ? -1 : pair.reference, b: pair.test,
                   mode: "wipe", wipe: 0.5, flipped: false, exposure: 0,
                   display: page.displays.length ? "pipeline" : "srgb", overlay: "none", opacity: 0.75,
                   scale: 0, centre: null, pixel: null, pinned: false};
@@ -43,7 +53,9 @@ class Viewer {
   }
 
   frameLabel(f) {
-    const why = f.why.map(w => w.replace(/^worst (.*)$/, (_, m) => "worst " + metricName(m)));
+    const worst = f.why.filter(w => w.startsWith("worst ")).map(w => metricName(w.slice(6)));
+    const why = f.why.filter(w => !w.startsWith("worst "));
+    if (worst.length) why.push("worst " + (worst.length > 3 ? `by ${worst.length} metrics` : worst.join(", ")));
     return `frame ${f.frame}` + (why.length ? ` ${DASH} ${why.join(", ")}` : "");
   }
 
@@ -58,7 +70,9 @@ class Viewer {
     this.tagB = h("span", {class: "tag b"});
     this.marks = [h("div", {class: "pixel", hidden: true}), h("div", {class: "pixel", hidden: true})];
     this.message = h("p", {class: "message", hidden: true});
-    this.stage = h("div", {class: "stage"}, this.canvas, this.tagA, this.tagB, this.handle, this.marks, this.message);
+    const colors = Array.from({length: 9}, (_, i) => `rgb(${this.page.heat.slice(3 * Math.round(i * 255 / 8)).slice(0, 3)})`);
+    this.legend = h("div", {class: "heat", hidden: true}, h("span"), h("i", {style: {background: `linear-gradient(90deg, ${colors})`}}), h("span", {}, "1"));
+    this.stage = h("div", {class: "stage"}, this.canvas, this.tagA, this.tagB, this.handle, this.marks, this.legend, this.message);
     this.readout = new Readout(this);
     this.root.append(this.choices(), this.stage, this.controls(), this.readout.element, this.notes());
     this.look = makeLook(this.canvas, this.page.heat, /[?&]2d\b/.test(location.search));
@@ -173,7 +187,7 @@ class Viewer {
       const metric = st.overlay === "flip" || st.overlay === "hdrflip" ? st.overlay : null;
       const blocks = [...sides, this.frame.ids, this.mapBlock("flip"), this.mapBlock("hdrflip")];
       const [a, b, ids, flip, hdrflip] = await Promise.all(blocks.map(x => x && loadBlock(x)));
-      const displays = await Promise.all([st.a, st.b].map(v => displayFor(this.page, st.display, v)));
+      const displays = await Promise.all([st.a, st.b].map(v => displayFor(this.page, this.frame, st.display, v)));
       if (ticket !== this.ticket) return;
       const resized = !this.loaded || this.loaded.pictures[0].image.width !== a.width ||
                       this.loaded.pictures[0].image.height !== a.height;
@@ -201,8 +215,9 @@ class Viewer {
   resize() {
     if (!this.loaded) return;
     const image = this.loaded.pictures[0].image, ratio = window.devicePixelRatio || 1;
-    const width = this.stage.clientWidth;
-    const height = Math.round(clamp(width * image.height / image.width, 160, Math.max(240, window.innerHeight * 0.72)));
+    const width = this.stage.clientWidth, most = Math.max(240, window.innerHeight * 0.74);
+    const scale = wholeScale(Math.min(width * ratio / image.width, most * ratio / image.height), ratio);
+    const height = Math.round(clamp(scale * image.height / ratio, 160, most));
     this.stage.style.height = height + "px";
     this.canvas.width = Math.round(width * ratio);
     this.canvas.height = Math.round(height * ratio);
@@ -214,8 +229,7 @@ class Viewer {
 
   fit() {
     const image = this.loaded.pictures[0].image;
-    let scale = Math.min(this.paneWidth() / image.width, this.canvas.height / image.height);
-    if (scale > 1) scale = Math.floor(scale); /* whole pixels */
+    const scale = wholeScale(Math.min(this.paneWidth() / image.width, this.canvas.height / image.height), window.devicePixelRatio || 1);
     this.state = {...this.state, scale: Math.max(scale, ZOOMS.low), centre: [image.width / 2, image.height / 2], fit: true};
     this.draw();
   }
@@ -286,6 +300,8 @@ class Viewer {
     this.selectFrame.value = st.frame;
     this.selectDisplay.value = st.display;
     this.selectOverlay.value = st.overlay;
+    this.legend.hidden = !scene.overlay;
+    this.legend.firstChild.textContent = (st.overlay === "difference" ? "difference" : metricName(st.overlay)) + " 0";
     this.opacityBox.hidden = st.overlay === "none";
     this.exposure.value = st.exposure;
     const stops = (st.exposure > 0 ? "+" : "") + fixed(st.exposure, 2);
