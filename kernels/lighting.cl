@@ -37,7 +37,8 @@ static inline void sum_lights(constant material_t *m, const surface_t *s, consta
                               global const float *shadow_thickness, int x, int y, floatv *diffuse, floatv *specular)
 {
     int at = rl_index(f, x, y);
-    int transmits = m->has_profile && m->shading_transmission && m->profile_transmission != OPAQUE;
+    int transmits = m->has_profile && m->shading_transmission && m->profile_transmission != OPAQUE &&
+                    m->profile_transmission != GATHER;
     int scattered = scatters(m);
     for (int i = 0; i < f->lights; i++) {
         constant light_t *light = &lights[i];

@@ -18,7 +18,7 @@ enum { POST, PRE_POST };
 enum { DISNEY, LAMBERT, SG };
 enum { GGX };
 enum { EXIT_IN_SSS, EXIT_IN_LIGHTING };
-enum { OPAQUE, THIN, THICK, BEER_LAMBERT };
+enum { OPAQUE, THIN, THICK, BEER_LAMBERT, GATHER }; /* GATHER: not in the lighting */
 enum { FROM_MAX, FROM_LAYER, FROM_SHADOW };
 
 /* Below this alpha a highlight of a light without size would be narrower than a pixel's worth of normals. */

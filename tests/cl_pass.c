@@ -155,12 +155,19 @@ static bool program_text(const cl_job *job, rl_str *s)
     for (size_t i = 0; i < pass->ports.n; i++) {
         const rl_port *port = &pass->ports.rows[i];
         const cl_image *image = cl_image_of(job, port);
-        rl_str_printf(s, "#define HAS_%s %d\n#define LAYOUT_%s %d\n", port->name, image && image->read,
-                      port->name, port->layout);
+        if (port->role == RL_READ)
+            rl_str_printf(s, "#define HAS_%s %d\n", port->name, image && image->read);
+        else
+            rl_str_printf(s, "#define LAYOUT_%s %d\n", port->name, port->layout);
     }
     ok = ok && add_file(s, "common.cl");
-    if (pass->kernel_prelude)
-        ok = ok && add_file(s, pass->kernel_prelude);
+    for (const char *names = pass->kernel_prelude; ok && names && *names;) { /* separated by spaces */
+        char name[64];
+        size_t n = strcspn(names, " ");
+        snprintf(name, sizeof name, "%.*s", (int)n, names);
+        ok = add_file(s, name);
+        names += n + strspn(names + n, " ");
+    }
     return ok && add_file(s, pass->kernel) && !s->failed;
 }
 
