@@ -33,7 +33,7 @@ typedef struct surface_t {
     floatv radius;           /* of curvature, metres; at most 1e6 */
     floatv bent[3][3];       /* the normal that each channel's scattering sees */
     sg_t sg[3];              /* of a material with SG, and the sharpness */
-    floatv sharpness[3];
+    floatv sharpness[3], blurred[3]; /* blurred: how far scattering counts, 0 where it is under a pixel */
 } surface_t;
 
 typedef struct ray_t {

@@ -1,5 +1,6 @@
-/* Light on the closest back face, for `translucency`: the half of Golubev's future work that comes before the gathering. The same lights
- * and the same diffuse model as in `lighting`; no specular reflection, which stays outside. */
+/* Light on the closest back face, for `translucency`: the half of Golubev's future work that comes before the
+ * gathering. The same lights and the same diffuse model as in `lighting`; no specular reflection, which stays
+ * outside. */
 #include "passes/shading_rows.h"
 
 typedef struct back_lighting_params {
@@ -28,10 +29,11 @@ static const rl_port ports[] = {
      .optional = true},
     {"shadow_thickness", RL_READ, RL_LIGHTS,
      .help = "metres along the light's ray; tells the object's own shadow from others'", .optional = true,
-     .if_absent = "back faces are lit by all lights that they face: nothing but their own object shades them"},
+     .if_absent =
+         "back faces are lit by all lights that they face: nothing but their own object shades them"},
     {"metallic", RL_READ, RL_SCALAR, .help = "0 to 1", .optional = true},
-    {"diffuse", RL_WRITE, RL_RGB, .help = "radiance that entered the back of materials with transmission: gather",
-     .any_layout = true},
+    {"diffuse", RL_WRITE, RL_RGB,
+     .help = "radiance that entered the back of materials with transmission: gather", .any_layout = true},
 };
 
 static const rl_step steps[] = {{"back_lighting", .domain = RL_EVERY_VECTOR}};

@@ -1,5 +1,6 @@
-/* Screen-space translucency: the light that entered the closest back face, gathered to the front through the object. What comes out goes
- * into `lit`, behind the filter of the front, since it is the whole way already: the exact integral over the surface is the sum of both. */
+/* Screen-space translucency: the light that entered the closest back face, gathered to the front through the
+ * object. What comes out goes into `lit`, behind the filter of the front, since it is the whole way already:
+ * the exact integral over the surface is the sum of both. */
 #include "passes/burley.h"
 #include "passes/shading_rows.h"
 
@@ -29,12 +30,15 @@ static const rl_param profile_keys[] = {
 static const rl_param shading_keys[] = {RL_ROW_DIFFUSE, RL_ROW_TRANSMIT, RL_ROW_EXIT_TRANSMISSION};
 
 static const rl_port ports[] = {
-    {"back", RL_READ, RL_RGB, .help = "radiance that entered the back face, from back_lighting", .layout = RL_PHASE4},
+    {"back", RL_READ, RL_RGB, .help = "radiance that entered the back face, from back_lighting",
+     .layout = RL_PHASE4},
     {"lit", RL_READ, RL_RGB, .help = "radiance that does not scatter, from lighting"},
     {"albedo", RL_READ, RL_RGB, .help = "0 to 1, of the front"},
     {"normal", RL_READ, RL_NORMAL, .help = "shading normal of the front, for the way out"},
     {"depth", RL_READ, RL_SCALAR, .help = "planar, metres", .layout = RL_PHASE4},
     {"back_depth", RL_READ, RL_SCALAR, .help = "of the closest back face, planar, metres; 0 = there is none",
+     .layout = RL_PHASE4},
+    {"back_normal", RL_READ, RL_NORMAL, .help = "of the closest back face; either way round",
      .layout = RL_PHASE4},
     {"stencil", RL_READ, RL_ID, .help = "material", .layout = RL_PHASE4},
     {"area", RL_SCRATCH, RL_SCALAR, .help = "of the back face that a pixel sees", .layout = RL_PHASE4},
@@ -49,8 +53,9 @@ static const rl_step steps[] = {
     {"translucency_resolve", .domain = RL_EVERY_VECTOR},
 };
 
-/* As kernels/translucency.cl reads it: 256 directions (cos, sin), then for planes at 0 and 2^k/4 of d, k = 1 … 7, the patterns: x and y of
- * taps on the golden spiral whose radii r have P(sqrt(r² + t²)) = P(t) + (1 - P(t)) (i + offset)/n. */
+/* As kernels/translucency.cl reads it: 256 directions (cos, sin), then for planes at 0 and 2^k/4 of d, k = 1
+ * … 7, the patterns: x and y of taps on the golden spiral whose radii r have P(sqrt(r² + t²)) = P(t) + (1 -
+ * P(t)) (i + offset)/n. */
 enum { TURNS = 256, DEPTHS = 8, TAP_BLOCK = 64, MOST_PATTERNS = 15, PATTERN_TAPS = 4096 };
 
 static size_t tap_stride(size_t taps)
@@ -92,7 +97,8 @@ static rl_code tables(const rl_pass_input *in, rl_arena *arena, rl_tables *out, 
     }
     for (int depth = 0; depth < DEPTHS; depth++)
         for (size_t j = 0; j < patterns; j++, to += 2 * stride)
-            make_taps(taps, depth ? ldexp(0.25, depth) : 0, ((double)j + 0.5) / (double)patterns, to, to + stride);
+            make_taps(taps, depth ? ldexp(0.25, depth) : 0, ((double)j + 0.5) / (double)patterns, to,
+                      to + stride);
     return RL_OK;
 }
 

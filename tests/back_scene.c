@@ -38,6 +38,7 @@ back_scene back_scene_make(int x, int y, int width, int height, float focal)
     s.lit = planes(3 * s.n);
     s.albedo = planes(3 * s.n);
     s.normal = planes(3 * s.n);
+    s.back_normal = planes(3 * s.n);
     s.through = planes(3 * s.n);
     s.out = planes(3 * s.n);
     s.depth = planes(s.n);
@@ -50,8 +51,8 @@ back_scene back_scene_make(int x, int y, int width, int height, float focal)
 
 void back_scene_free(back_scene *s)
 {
-    float *all[] = {s->back,  s->lit,        s->albedo,           s->normal,  s->through, s->out,
-                    s->depth, s->back_depth, (float *)s->stencil};
+    float *all[] = {s->back, s->lit,   s->albedo,     s->normal,      s->through,
+                    s->out,  s->depth, s->back_depth, s->back_normal, (float *)s->stencil};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++)
         rl_free(all[i]);
 }
@@ -79,7 +80,8 @@ void back_scene_random(back_scene *s, uint32_t seed)
         int id = uniform(&seed) < 0.02f ? (int)(uniform(&seed) * 6) : nearest % 6;
         float step = nearest >= 9 ? 0.3f : nearest >= 6 ? 0.02f : 0;
         float bump = 0.004f * sinf(0.13f * (float)x) * cosf(0.21f * (float)y);
-        float thick = 0.0005f + 0.01f * (1 + sinf(0.07f * (float)x + (float)nearest)) + 0.001f * uniform(&seed);
+        float thick =
+            0.0005f + 0.01f * (1 + sinf(0.07f * (float)x + (float)nearest)) + 0.001f * uniform(&seed);
         float n[3] = {uniform(&seed) - 0.5f, uniform(&seed) - 0.5f, 0.1f + uniform(&seed)};
         float length = sqrtf(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
         s->stencil[i] = (uint32_t)id;
@@ -90,6 +92,7 @@ void back_scene_random(back_scene *s, uint32_t seed)
             s->lit[c * s->n + i] = id ? uniform(&seed) : 0;
             s->albedo[c * s->n + i] = uniform(&seed);
             s->normal[c * s->n + i] = n[c] / length;
+            s->back_normal[c * s->n + i] = -n[(c + 1) % 3] / length;
         }
     }
 }
@@ -97,10 +100,15 @@ void back_scene_random(back_scene *s, uint32_t seed)
 void back_scene_run(back_scene *s, back_params p)
 {
     const cl_image images[] = {
-        {"back", s->back, NULL},         {"lit", s->lit, NULL},
-        {"albedo", s->albedo, NULL},     {"normal", s->normal, NULL},
-        {"depth", s->depth, NULL},       {"back_depth", s->back_depth, NULL},
-        {"stencil", s->stencil, NULL},   {"through", NULL, s->through},
+        {"back", s->back, NULL},
+        {"lit", s->lit, NULL},
+        {"albedo", s->albedo, NULL},
+        {"normal", s->normal, NULL},
+        {"depth", s->depth, NULL},
+        {"back_depth", s->back_depth, NULL},
+        {"back_normal", s->back_normal, NULL},
+        {"stencil", s->stencil, NULL},
+        {"through", NULL, s->through},
         {"lit", NULL, s->out},
     };
     cl_job job = {.pass = &rl_pass_translucency,

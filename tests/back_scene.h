@@ -1,5 +1,6 @@
 /* Made-up captures with back faces for the tests of translucency: images, the pass run on them, and the exact
- * integral over the true back face. Camera and world are the same; it looks down -z. Failures fail the test. */
+ * integral over the true back face. Camera and world are the same; it looks down -z. Failures fail the test.
+ */
 #ifndef RL_TESTS_BACK_SCENE_H
 #define RL_TESTS_BACK_SCENE_H
 
@@ -25,7 +26,7 @@ typedef struct back_params {
 typedef struct back_scene {
     frame_t frame;
     const back_material *materials;
-    float *back, *lit, *albedo, *normal, *depth, *back_depth; /* planes of columns x rows */
+    float *back, *lit, *albedo, *normal, *depth, *back_depth, *back_normal; /* planes of columns x rows */
     uint32_t *stencil;
     float *through, *out;
     size_t n; /* pixels of a plane */

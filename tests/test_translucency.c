@@ -23,7 +23,8 @@ static double dot(const double a[3], const double b[3])
 
 /* Planes n.P = -front and n.P = -front - t (metres), seen where the ray meets them within 0.3 … 2 m; light on
  * the back is `light` of the point there. */
-static void make_slab(back_scene *s, const double n[3], double front, double t, double (*light)(const double p[3]))
+static void make_slab(back_scene *s, const double n[3], double front, double t,
+                      double (*light)(const double p[3]))
 {
     BACK_EACH_PIXEL(s, x, y, i)
     {
@@ -37,7 +38,7 @@ static void make_slab(back_scene *s, const double n[3], double front, double t, 
         for (int k = 0; k < 3; k++)
             p[k] = ray[k] * s->back_depth[i];
         for (size_t c = 0; c < 3; c++)
-            s->back[c * s->n + i] = (float)light(p);
+            s->back[c * s->n + i] = (float)light(p), s->back_normal[c * s->n + i] = (float)-n[c];
     }
 }
 
@@ -73,10 +74,12 @@ static void even_slabs_are_exact(void **state)
                     back_scene_run(&s, (back_params){32, 3, n});
                     for (size_t c = 0; c < 3; c++) {
                         size_t at = 35u * (size_t)s.frame.columns + 70u;
-                        double want = through_slab(thick_mm[j], (double)back_materials[1].scatter_distance_mm[c]);
+                        double want =
+                            through_slab(thick_mm[j], (double)back_materials[1].scatter_distance_mm[c]);
                         double off = (double)s.through[c * s.n + at] / want - 1;
                         if (fabs(off) > 0.01)
-                            print_message("%zu %g mm %g px: %g %+.3f %%\n", k, thick_mm[j], focal[i], want, 100 * off);
+                            print_message("%zu %g mm %g px: %g %+.3f %%\n", k, thick_mm[j], focal[i], want,
+                                          100 * off);
                         worst = fmax(worst, fabs(off));
                     }
                 }
@@ -107,7 +110,8 @@ static void make_ball(back_scene *s, const ball *b)
     {
         double ray[3], p[3];
         back_ray(s, x, y, ray);
-        double a = dot(ray, ray), h = dot(ray, b->centre), c = dot(b->centre, b->centre) - b->radius * b->radius;
+        double a = dot(ray, ray), h = dot(ray, b->centre),
+               c = dot(b->centre, b->centre) - b->radius * b->radius;
         double root = h * h - a * c;
         if (root <= 0)
             continue;
@@ -117,7 +121,8 @@ static void make_ball(back_scene *s, const ball *b)
         for (int k = 0; k < 3; k++)
             p[k] = ray[k] * (h + sqrt(root)) / a;
         for (size_t k = 0; k < 3; k++)
-            s->back[k * s->n + i] = (float)ball_light(b, p);
+            s->back[k * s->n + i] = (float)ball_light(b, p),
+                               s->back_normal[k * s->n + i] = (float)((p[k] - b->centre[k]) / b->radius);
     }
 }
 
@@ -140,7 +145,8 @@ static void ball_truth(const ball *b, const double x[3], const float d_mm[3], do
             double cosine = first + (1 - first) * (i + 0.5) / BANDS, sine = sqrt(1 - cosine * cosine);
             double turn = 2 * pi * (j + 0.5) / TURNS, p[3], r2 = 0;
             for (int k = 0; k < 3; k++) {
-                p[k] = b->centre[k] + b->radius * (cosine * axis[k] + sine * (cos(turn) * u[k] + sin(turn) * v[k]));
+                p[k] = b->centre[k] +
+                       b->radius * (cosine * axis[k] + sine * (cos(turn) * u[k] + sin(turn) * v[k]));
                 r2 += (p[k] - x[k]) * (p[k] - x[k]);
             }
             double light = ball_light(b, p) * area;
@@ -151,7 +157,7 @@ static void ball_truth(const ball *b, const double x[3], const float d_mm[3], do
 
 static void balls_match_the_integral(void **state)
 {
-    const ball b = {{0.004, -0.003, -0.3}, 0.009, {0.48, 0.36, -0.8}};
+    const ball b = {{0.004, -0.0005, -0.3}, 0.009, {0.48, 0.36, -0.8}};
     (void)state;
     back_scene s = back_scene_make(0, 0, 160, 120, 1600);
     s.frame.camera.centre[0] = 80;
@@ -181,6 +187,8 @@ static void balls_match_the_integral(void **state)
             for (int k = 0; k < 3; k++)
                 ray[k] *= (double)s.depth[i];
             ball_truth(&b, ray, back_materials[1].scatter_distance_mm, want);
+            if (y == 60 || x == 101)
+                print_message("%d,%d: %g %g  t %g\n", x, y, sum[i], want[0], s.back_depth[i] - s.depth[i]);
             for (size_t c = 0; c < 3; c++) {
                 error[c] += fabs((double)sum[c * s.n + i] - want[c]);
                 bias[c] += (double)sum[c * s.n + i] - want[c];
