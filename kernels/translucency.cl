@@ -184,13 +184,13 @@ static inline void place_taps(constant frame_t *f, const lanes_t *g, constant fl
     }
 }
 
-/* Weights of the three channels for a point of depth `z` and pixels (x, y) away: R of the distance from the lane's front
- * point, times `share`. */
-static inline void weigh(const planes_t *in, const lanes_t *g, float x, float y, floatv z, floatv share, intv counts,
-                         floatv w[3])
+/* Weights of the three channels for a point `behind` the front's depth and pixels (x, y) away: R of the distance from the
+ * lane's front point, times `share`. */
+static inline void weigh(const planes_t *in, const lanes_t *g, float x, float y, floatv behind, floatv share,
+                         intv counts, floatv w[3])
 {
     constant float *focal = in->f->camera.focal;
-    floatv less = g->z - z;
+    floatv less = -behind, z = g->z + behind;
     floatv dx = fma(g->rx, less, z * (-x / focal[0])), dy = fma((floatv)g->ry, less, z * (y / focal[1]));
     floatv q = fmax(fma(dx, dx, fma(dy, dy, less * less)) * (g->inv_d * g->inv_d), 1e-12f);
     floatv ir = rsqrt(q), r = q * ir, common = scatter_keep(ir * share, counts);
@@ -232,13 +232,14 @@ static inline void add_tap(const planes_t *in, const lanes_t *g, const taps_t *t
     float x = taps->x[i], y = taps->y[i], weight = taps->weight[i] * g->per_middle;
     float from_x = x - (float)taps->dx[i], from_y = y - (float)taps->dy[i]; /* the pixel's middle */
     intv id = rl_as_intv(rl_vload(0, in->stencil + a)), same = id == g->material;
-    floatv z = rl_vload(0, in->back_depth + a), w[3];
+    floatv z = rl_vload(0, in->back_depth + a), per = 1.0f / g->far, w[3];
     intv sample = same & (z > 0.0f);
     if (scatter_any(sample)) {
-        floatv share = weight * rl_vload(0, in->area + a);
-        z = fma(rl_vload(0, in->slope + a), (floatv)from_x, fma(rl_vload(0, in->slope + plane4 + a), (floatv)from_y, z));
-        z = rl_select(g->z, z, sample);
-        weigh(in, g, x, y, z, share, sample, w);
+        /* To the tap's place in the pixel, on its tangent plane: depth times 1/(1 - e), area times the cube. */
+        floatv e = fma(rl_vload(0, in->slope + a), (floatv)from_x, rl_vload(0, in->slope + plane4 + a) * from_y) / z;
+        floatv share = weight * rl_vload(0, in->area + a) * fma(e, (floatv)3.0f, (floatv)1.0f);
+        floatv behind = fma(z, fma(e, e, e), z - g->z);
+        weigh(in, g, x, y, rl_select((floatv)0.0f, behind, sample), share, sample, w);
         for (int c = 0; c < 3; c++) /* no point sends more than all of its light */
             sum->light[c] = fma(fmin(w[c], 1.0f), scatter_keep(rl_vload(0, in->back + c * plane4 + a), sample), sum->light[c]);
     }
@@ -250,9 +251,10 @@ static inline void add_tap(const planes_t *in, const lanes_t *g, const taps_t *t
         ends |= ~inside & (ids_at_border(in, &g->v, taps->dx[i], taps->dy[i]) != g->material);
     intv counts = same | g->keep | ends;
     /* The plane's depth is 1/(1 - a x - b y) of the pixel's, the area that a pixel sees goes with its cube. */
-    floatv per = 1.0f / g->far, tilt = fma(g->slope[0] * per, (floatv)x, g->slope[1] * per * y);
-    floatv more = 1.0f / fmax(1.0f - tilt, 0.05f), share = weight * g->area * more * more * more;
-    weigh(in, g, x, y, g->far * more, share, g->has, w);
+    floatv tilt = fma(g->slope[0] * per, (floatv)x, g->slope[1] * per * y);
+    tilt = fmin(tilt, 0.95f);
+    floatv more = 1.0f / (1.0f - tilt), share = weight * g->area * more * more * more;
+    weigh(in, g, x, y, fma(g->far * tilt, more, g->t), share, g->has, w);
     for (int c = 0; c < 3; c++) {
         sum->plane[c] += w[c];
         sum->known[c] += scatter_keep(w[c], counts);
