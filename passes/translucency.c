@@ -13,7 +13,7 @@ typedef struct translucency_params {
 } translucency_params;
 
 static const rl_param params[] = {
-    P(translucency_params, RL_I32, taps, 3, 4096, 32, "samples a pixel", "a third of them for each channel"),
+    P(translucency_params, RL_I32, taps, 3, 4096, 64, "samples a pixel", "a third of them for each channel"),
     P_ENUM(translucency_params, rotation, "none|white|ign|blue", 3,
            "how the pattern changes from pixel to pixel and from frame to frame, as in sss_burley"),
     P(translucency_params, RL_I32, seed, 0, 2147483647, 0, "", "another choice of patterns"),

@@ -156,7 +156,7 @@ static double plane_of(double thin)
 /* ---- taps ---- */
 
 typedef struct tap {
-    float x, y; /* pixels */
+    float x, y;   /* pixels */
     double share; /* 1/(n density), m² at the middle depth */
 } tap;
 
@@ -223,15 +223,17 @@ void back_twin(const back_scene *s, int x, int y, back_params p, double through[
             face f = face_of(s, px, py);
             double e = (f.slope[0] * (t.x - (double)dx) + f.slope[1] * (t.y - (double)dy)) / f.z;
             for (size_t c = 0; c < 3; c++) {
-                double w = weight(s, x, y, t.x, t.y, f.z * (1 + e + e * e), d_mm[c] * 1e-3) * f.area * (1 + 3 * e) / middle2 * t.share;
+                double w = weight(s, x, y, t.x, t.y, f.z * (1 + e + e * e), d_mm[c] * 1e-3) * f.area *
+                           (1 + 3 * e) / middle2 * t.share;
                 light[c] += fmin(w, 1) * (double)s->back[c * s->n + at(s, px, py)];
             }
         }
-        bool counts = same || m->border || ended(s, px, py, id, own.z > 0 ? (float)own.z : s->depth[at(s, x, y)]);
+        bool counts =
+            same || m->border || ended(s, px, py, id, own.z > 0 ? (float)own.z : s->depth[at(s, x, y)]);
         double more = 1 / fmax(1 - (own.slope[0] * t.x + own.slope[1] * t.y) / own.z, 0.05);
         for (int c = 0; c < 3 && own.z > 0; c++) {
-            double w = weight(s, x, y, t.x, t.y, own.z * more, d_mm[c] * 1e-3) * own.area * pow(more, 3) / middle2 *
-                       t.share;
+            double w = weight(s, x, y, t.x, t.y, own.z * more, d_mm[c] * 1e-3) * own.area * pow(more, 3) /
+                       middle2 * t.share;
             plane[c] += w;
             known[c] += counts ? w : 0;
         }
@@ -239,7 +241,9 @@ void back_twin(const back_scene *s, int x, int y, back_params p, double through[
     for (int c = 0; c < 3; c++) {
         double along = fmax(own.z - (double)s->depth[at(s, x, y)], 0) * own.z * own.z / own.area;
         double off = fmin(fmax((1 - rl_burley_cdf(along, d_mm[c] * 1e-3)) / plane[c], 0.5), 2);
-        through[c] = own.z <= 0 ? light[c] : known[c] > 1e-3 * plane[c] ? light[c] * off * plane[c] / known[c] : 0;
+        through[c] = own.z <= 0                   ? light[c]
+                     : known[c] > 1e-3 * plane[c] ? light[c] * off * plane[c] / known[c]
+                                                  : 0;
     }
 }
 
@@ -257,8 +261,9 @@ void back_dense(const back_scene *s, int x, int y, double through[3])
             continue;
         face f = face_of(s, px, py);
         for (size_t c = 0; c < 3; c++)
-            through[c] += weight(s, x, y, px - x, py - y, f.z, s->materials[id].scatter_distance_mm[c] * 1e-3) *
-                          f.area / ((double)focal[0] * (double)focal[1]) * (double)s->back[c * s->n + i];
+            through[c] +=
+                weight(s, x, y, px - x, py - y, f.z, s->materials[id].scatter_distance_mm[c] * 1e-3) *
+                f.area / ((double)focal[0] * (double)focal[1]) * (double)s->back[c * s->n + i];
     }
 }
 
