@@ -166,7 +166,7 @@ static ball_error compare_ball(const back_scene *s, const ball *b, const float *
     BACK_EACH_PIXEL(s, x, y, i)
     {
         double ray[3], want[3];
-        bool edge = !s->stencil[i] || (x * 7 + y * 3) % 97;
+        bool edge = !s->stencil[i] || (x * 7 + y * 3) % 47;
         for (int k = -2; k <= 2 && !edge; k++)
             edge =
                 !s->stencil[(size_t)((long)i + k)] || !s->stencil[(size_t)((long)i + k * s->frame.columns)];
