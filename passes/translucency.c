@@ -115,4 +115,5 @@ const rl_pass rl_pass_translucency = {
     .ports = RL_ARRAY(ports),
     .steps = RL_ARRAY(steps),
     .tables = tables,
+    .fulfils = "transmission: gather",
 };

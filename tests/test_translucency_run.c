@@ -274,6 +274,15 @@ static void missing_layers_are_named(void **state)
     expect(RUN("check", pipe, "--capture", folder), 0, "");
     expect(RUN("check", pipe, "--capture", folder, "--set", "profiles.skin.scatter_distance_mm=null"), 2,
            "scatter_distance_mm");
+    expect(RUN("check", pipe, "--capture", folder, "--set", "graph.through=null", "--set",
+               "graph.sss.in.lit=light.lit"),
+           2,
+           "p.yaml:6:3: error: the profile of material 'skin' has 'transmission: gather', which pass "
+           "translucency does: the "
+           "graph has none");
+    expect(RUN("check", pipe, "--capture", folder, "--set", "graph.through=null", "--set",
+               "graph.sss.in.lit=light.lit", "--set", "shading.transmission=false"),
+           0, "");
     free(pipe);
     folder_remove(folder);
 }

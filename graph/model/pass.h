@@ -241,6 +241,10 @@ typedef struct rl_pass {
      * holds elsewhere. */
     double (*least_share)(const void *params);
     const char *fades_where;
+    /* "transmission: gather", a profile key of the pass and a word of it, that no other pass fulfils: a graph
+     * that reads the key elsewhere needs this pass too (graph.h). A shading key of that name that is false
+     * switches it off. NULL: there is no such word. */
+    const char *fulfils;
 } rl_pass;
 
 /* The struct holds the table's 4-byte fields and nothing else; RGB rows count three. */
