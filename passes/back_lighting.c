@@ -38,6 +38,12 @@ static const rl_port ports[] = {
 
 static const rl_step steps[] = {{"back_lighting", .domain = RL_EVERY_VECTOR}};
 
+static double cost(const void *of)
+{
+    (void)of;
+    return 14;
+}
+
 const rl_pass rl_pass_back_lighting = {
     .name = "back_lighting",
     .help = "direct and ambient light that enters the closest back face",
@@ -53,4 +59,5 @@ const rl_pass rl_pass_back_lighting = {
     .steps = RL_ARRAY(steps),
     .lights = true,
     .ambient = true,
+    .cost = cost,
 };

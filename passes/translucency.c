@@ -102,6 +102,12 @@ static rl_code tables(const rl_pass_input *in, rl_arena *arena, rl_tables *out, 
     return RL_OK;
 }
 
+/* Of a picture that is about half skin. */
+static double cost(const void *of)
+{
+    return 20 + 8.0 * ((const translucency_params *)of)->taps;
+}
+
 const rl_pass rl_pass_translucency = {
     .name = "translucency",
     .help = "light from the closest back face, gathered through the object with Burley's profile",
@@ -115,5 +121,6 @@ const rl_pass rl_pass_translucency = {
     .ports = RL_ARRAY(ports),
     .steps = RL_ARRAY(steps),
     .tables = tables,
+    .cost = cost,
     .fulfils = "transmission: gather",
 };

@@ -245,6 +245,9 @@ typedef struct rl_pass {
      * that reads the key elsewhere needs this pass too (graph.h). A shading key of that name that is false
      * switches it off. NULL: there is no such word. */
     const char *fulfils;
+    /* What the arithmetic of a pixel costs, as so many reads or writes of a plane: a rough figure from `relit
+     * bench`, for predictions. NULL: next to nothing. `params` is the pass's struct. */
+    double (*cost)(const void *params);
 } rl_pass;
 
 /* The struct holds the table's 4-byte fields and nothing else; RGB rows count three. */
