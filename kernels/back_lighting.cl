@@ -1,5 +1,5 @@
 /* Light that enters the closest back face (Golubev 2018, future work: "diffuse shading of the closest back face"), behind
- * back_face.cl, sg.cl, surface.cl and sg_shade.cl. The same radiometry as lighting.cl: the radiance that would be sent back at the
+ * sg.cl and surface.cl. The same radiometry as lighting.cl: the radiance that would be sent back at the
  * same place, without exit(albedo) and F_out. */
 
 enum { AWAY, TOWARDS_CAMERA }; /* params_t.facing */
@@ -38,6 +38,14 @@ static inline void sum_back_lights(constant material_t *m, const surface_t *s, c
     }
 }
 
+/* Ambient irradiance times F_in as on a front that does not scatter in the lighting; nothing shades it. */
+static inline void add_sky(constant material_t *m, const surface_t *s, constant ambient_t *ambient, floatv *sum)
+{
+    float entered = m->shading_diffuse == DISNEY ? 41.0f / 42.0f : 1.0f;
+    for (int c = 0; c < 3; c++)
+        sum[c] += entered * (sh_irradiance(ambient, c, s->n, 1.0f, 1.0f) + lobe_irradiance(ambient, c, s->n, 0, 1.0f));
+}
+
 kernel void back_lighting(global const float *albedo, global const float *back_albedo,
                           global const float *back_normal, global const float *back_depth,
                           global const float *depth, global const uint *stencil, global const float *shadow,
@@ -70,7 +78,7 @@ kernel void back_lighting(global const float *albedo, global const float *back_a
             continue;
         sum_back_lights(m, &s, f, lights, shadow, shadow_thickness, thickness, at, sum);
         if (ambient->on)
-            add_ambient(m, &s, ambient, sum);
+            add_sky(m, &s, ambient, sum);
         floatv metal = HAS_metallic ? rl_load(metallic, at) : (floatv)0.0f;
         if (m->material_metallic >= 0.0f)
             metal = m->material_metallic;
