@@ -17,6 +17,7 @@
  * How wrong: what the closest back face hides, and what lies beyond the image, is missing. */
 
 #define TAP_BLOCK 64
+#define AHEAD     8 /* taps from fetching to loading */
 #define TURNS     256
 #define NEAR      0.8f /* lanes share a scale from here to 1 times the farthest */
 
@@ -261,6 +262,20 @@ static inline void add_tap(const planes_t *in, const lanes_t *g, const taps_t *t
     }
 }
 
+/* The planes of a tap that comes soon. */
+static inline void fetch_tap(const planes_t *in, int at)
+{
+    int plane = in->f->plane4;
+    scatter_fetch((global const float *)in->stencil + at);
+    scatter_fetch(in->depth + at);
+    scatter_fetch(in->back_depth + at);
+    scatter_fetch(in->area + at);
+    scatter_fetch(in->slope + at);
+    scatter_fetch(in->slope + plane + at);
+    for (int c = 0; c < 3; c++)
+        scatter_fetch(in->back + c * plane + at);
+}
+
 /* Light from the back, of the lanes in `now`. */
 static inline void sum_taps(const planes_t *in, const lanes_t *g, constant float *tables, int n, intv now, floatv out[3])
 {
@@ -269,8 +284,10 @@ static inline void sum_taps(const planes_t *in, const lanes_t *g, constant float
     for (int first = 0; first < n; first += TAP_BLOCK) {
         int count = min(TAP_BLOCK, n - first);
         place_taps(in->f, g, tables, n, first, count, &taps);
-        for (int i = 0; i < count; i++)
+        for (int i = 0; i < count; i++) {
+            fetch_tap(in, taps.at[min(i + AHEAD, count - 1)]);
             add_tap(in, g, &taps, i, &sum);
+        }
     }
     floatv t = g->t * g->inv_d * (g->far * g->far / fmax(g->area, 1e-30f)); /* along the back's normal */
     for (int c = 0; c < 3; c++) {
