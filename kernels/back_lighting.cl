@@ -1,13 +1,14 @@
-/* Light that enters the closest back face (Golubev 2018, future work: "diffuse shading of the closest back face"), behind
- * sg.cl and surface.cl. The same radiometry as lighting.cl: the radiance that would be sent back at the
- * same place, without exit(albedo) and F_out. */
+/* Light that enters the closest back face (Golubev 2018, future work: "diffuse shading of the closest back
+ * face"), behind sg.cl and surface.cl. The same radiometry as lighting.cl: the radiance that would be sent
+ * back at the same place, without exit(albedo) and F_out. */
 
 enum { AWAY, TOWARDS_CAMERA }; /* params_t.facing */
 
-/* Shadows are recorded for what the camera sees: the light that goes to the front point meets something first, at
- * front + l shadow_thickness. When that lies above the plane of the back face by no more than the object is thick there (and 1 mm), it is
- * taken for the back of the object, which is lit then: the rule of `transmission: thin`. Otherwise the front's visibility counts. Where
- * the way through is not known there is no telling the object itself from what shades it: lit. */
+/* Shadows are recorded for what the camera sees: the light that goes to the front point meets something
+ * first, at front + l shadow_thickness. When that lies above the plane of the back face by no more than the
+ * object is thick there (and 1 mm), it is taken for the back of the object, which is lit then: the rule of
+ * `transmission: thin`. Otherwise the front's visibility counts. Where the way through is not known there is
+ * no telling the object itself from what shades it: lit. */
 static inline floatv back_visibility(const surface_t *s, const ray_t *r, floatv thickness)
 {
     if (!r->has_thickness)
@@ -18,7 +19,8 @@ static inline floatv back_visibility(const surface_t *s, const ray_t *r, floatv 
 /* E F_in of all lights, a channel. `thickness` is the way from front to back along the back's normal. */
 static inline void sum_back_lights(constant material_t *m, const surface_t *s, constant frame_t *f,
                                    constant light_t *lights, global const float *shadow,
-                                   global const float *shadow_thickness, floatv thickness, int at, floatv *sum)
+                                   global const float *shadow_thickness, floatv thickness, int at,
+                                   floatv *sum)
 {
     for (int i = 0; i < f->lights; i++) {
         constant light_t *light = &lights[i];
@@ -26,7 +28,8 @@ static inline void sum_back_lights(constant material_t *m, const surface_t *s, c
         aim(&r, s, light, &f->camera);
         if (!rl_any(r.nl > 0.0f))
             continue;
-        r.has_thickness = HAS_shadow && light->shadow >= 0 && HAS_shadow_thickness && light->shadow_thickness >= 0;
+        r.has_thickness =
+            HAS_shadow && light->shadow >= 0 && HAS_shadow_thickness && light->shadow_thickness >= 0;
         if (r.has_thickness) {
             r.visibility = rl_load(shadow, light->shadow * f->plane + at);
             r.shadow_thickness = rl_load(shadow_thickness, light->shadow_thickness * f->plane + at);
@@ -39,11 +42,13 @@ static inline void sum_back_lights(constant material_t *m, const surface_t *s, c
 }
 
 /* Ambient irradiance times F_in as on a front that does not scatter in the lighting; nothing shades it. */
-static inline void add_sky(constant material_t *m, const surface_t *s, constant ambient_t *ambient, floatv *sum)
+static inline void add_sky(constant material_t *m, const surface_t *s, constant ambient_t *ambient,
+                           floatv *sum)
 {
     float entered = m->shading_diffuse == DISNEY ? 41.0f / 42.0f : 1.0f;
     for (int c = 0; c < 3; c++)
-        sum[c] += entered * (sh_irradiance(ambient, c, s->n, 1.0f, 1.0f) + lobe_irradiance(ambient, c, s->n, 0, 1.0f));
+        sum[c] += entered *
+                  (sh_irradiance(ambient, c, s->n, 1.0f, 1.0f) + lobe_irradiance(ambient, c, s->n, 0, 1.0f));
 }
 
 kernel void back_lighting(global const float *albedo, global const float *back_albedo,
@@ -51,7 +56,8 @@ kernel void back_lighting(global const float *albedo, global const float *back_a
                           global const float *depth, global const uint *stencil, global const float *shadow,
                           global const float *shadow_thickness, global const float *metallic,
                           global float *diffuse, constant params_t *p, constant frame_t *f,
-                          constant material_t *materials, constant light_t *lights, constant ambient_t *ambient)
+                          constant material_t *materials, constant light_t *lights,
+                          constant ambient_t *ambient)
 {
     int x = RL_W * (int)get_global_id(0), y = (int)get_global_id(1), at = rl_index(f, x, y);
     intv left = rl_as_intv(rl_load_id(stencil, at)), id = left;

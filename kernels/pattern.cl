@@ -1,4 +1,5 @@
-/* Which pattern of taps a pixel takes: what changes from phase to phase of RL_PHASE4 and from frame to frame. */
+/* Which pattern of taps a pixel takes: what changes from phase to phase of RL_PHASE4 and from frame to frame.
+ */
 
 enum { ROTATION_NONE = 0, ROTATION_WHITE = 1, ROTATION_IGN = 2, ROTATION_BLUE = 3 };
 

@@ -6,9 +6,10 @@ static inline int scatters(constant material_t *m)
     return HAS_curvature && m->has_profile && m->shading_diffuse == SG;
 }
 
-/* The level of detail of the other models (Golubev 2018; DESIGN 4.2): no scattering where the radius within which 0.997 of Burley's light of
- * that variance comes out, 16.5644 sqrt(v/7), is under half a pixel, blended over a tenth around it. From afar all models are the
- * unfiltered surface, and so is this one; without it a light stays blurred by its Gaussian however small that is on screen. */
+/* The level of detail of the other models (Golubev 2018; DESIGN 4.2): no scattering where the radius within which
+ * 0.997 of Burley's light of that variance comes out, 16.5644 sqrt(v/7), is under half a pixel, blended over a tenth
+ * around it. From afar all models are the unfiltered surface, and so is this one; without it a light stays blurred by
+ * its Gaussian however small that is on screen: up to 1.2 % near the terminator. */
 static inline floatv scatter_blurred(float variance_mm2, floatv pixel_mm)
 {
     floatv rho = 6.26075f * sqrt(variance_mm2) / pixel_mm;
