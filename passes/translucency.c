@@ -102,6 +102,12 @@ static rl_code tables(const rl_pass_input *in, rl_arena *arena, rl_tables *out, 
     return RL_OK;
 }
 
+static bool stochastic(const void *of, bool march)
+{
+    (void)march;
+    return ((const translucency_params *)of)->rotation != 0; /* none */
+}
+
 /* Of a picture that is about half skin. */
 static double cost(const void *of)
 {
@@ -121,6 +127,7 @@ const rl_pass rl_pass_translucency = {
     .ports = RL_ARRAY(ports),
     .steps = RL_ARRAY(steps),
     .tables = tables,
+    .stochastic = stochastic,
     .cost = cost,
     .fulfils = "transmission: gather",
 };
