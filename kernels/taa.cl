@@ -36,15 +36,10 @@ static inline void find_place(constant frame_t *f, global const float *depth, gl
 {
     float m[12];
     int moved = camera_change(f, m);
-    floatv own = far_if_empty(rl_load(depth, rl_index(f, x, y))), best = own, last = own, ox = 0.0f, oy = 0.0f;
-    floatv near_dx = 0.0f, near_dy = 0.0f;
+    floatv own = far_if_empty(rl_load(depth, rl_index(f, x, y))), best = own, last = own, ratio = 1.0f, ignored[2];
     p->alone = (intv)-1;
     p->low = p->high = own;
-    p->dx = p->dy = 0.0f;
-#if HAS_motion
-    near_dx = p->dx = tap(motion, f, x, y);
-    near_dy = p->dy = tap(motion + f->plane, f, x, y);
-#endif
+    floatv own_dx = tap(motion, f, x, y), own_dy = tap(motion + f->plane, f, x, y), near_dx = own_dx, near_dy = own_dy;
     for (int i = 0; i < 9; i++) {
         int nx = x + i % 3 - 1, ny = y + i / 3 - 1;
         if (i == 4)
@@ -59,32 +54,17 @@ static inline void find_place(constant frame_t *f, global const float *depth, gl
         p->low = rl_select(p->low, fmin(p->low, z), mine);
         p->high = rl_select(p->high, fmax(p->high, z), mine);
 #endif
-#if HAS_motion
         near_dx = rl_select(near_dx, tap(motion, f, nx, ny), closer);
         near_dy = rl_select(near_dy, tap(motion + f->plane, f, nx, ny), closer);
-#else
-        ox = rl_select(ox, (floatv)(float)(i % 3 - 1), closer);
-        oy = rl_select(oy, (floatv)(float)(i / 3 - 1), closer);
-#endif
     }
     p->edge = last > best * (1.0f + DEPTH_TOLERANCE);
     p->alone &= ~p->edge;
     p->behind = best < own * (1.0f - DEPTH_TOLERANCE);
-    p->follows = 0;
-    floatv px = rl_to_floatv(RL_LANES + x), py = (float)y, ratio = 1.0f, own_dx = p->dx, own_dy = p->dy, ignored;
     if (moved)
-        follow(f, m, px, py, own, &own_dx, &own_dy, &ratio);
+        follow(f, m, rl_to_floatv(RL_LANES + x), (float)y, own, &ignored[0], &ignored[1], &ratio);
     p->then = rl_select(FAR, own * ratio, own < FAR);
     p->low *= ratio;
     p->high *= ratio;
-#if HAS_motion
-    own_dx = p->dx;
-    own_dy = p->dy;
-#else
-    if (!moved)
-        return;
-    follow(f, m, px + ox, py + oy, best, &near_dx, &near_dy, &ignored);
-#endif
     p->follows = p->behind & (fmax(fabs(near_dx - own_dx), fabs(near_dy - own_dy)) > SLIDES);
     p->dx = snap(rl_select(own_dx, near_dx, p->behind));
     p->dy = snap(rl_select(own_dy, near_dy, p->behind));
@@ -177,8 +157,9 @@ static inline uintv displacement_key(constant frame_t *f, int x, int y, floatv d
 
 kernel void taa(global const float *color, global const float *depth, global const float *motion,
                 global const uint *stencil, global const float *last_color, global const float *last_depth,
-                global const uint *last_stencil, global const float *last_count, global float *out_color,
-                global float *out_count, constant params_t *p, constant frame_t *f, constant material_t *materials)
+                global const uint *last_stencil, global const float *last_count, global const float *moved,
+                global float *out_color, global float *out_count, constant params_t *p, constant frame_t *f,
+                constant material_t *materials)
 {
     int x = RL_W * (int)get_global_id(0), y = (int)get_global_id(1), at = rl_index(f, x, y);
     history_t h = {last_color, last_depth, last_count, last_stencil};
@@ -193,7 +174,7 @@ kernel void taa(global const float *color, global const float *depth, global con
 #if HAS_stencil
         id = rl_load_id(stencil, at);
 #endif
-        find_place(f, depth, motion, stencil, x, y, id, &place);
+        find_place(f, depth, HAS_motion ? motion : moved, stencil, x, y, id, &place);
         floatv dx = place.dx, dy = place.dy;
         intv still = (dx == 0.0f) & (dy == 0.0f);
         colour_box(&box, f, color, own, x, y, rl_select(p->clip_gamma, STILL * p->clip_gamma, still));

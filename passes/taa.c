@@ -31,12 +31,16 @@ static const rl_port ports[] = {
     {"last_depth", RL_HISTORY, RL_SCALAR, .of = "depth", .help = "the previous depth"},
     {"last_stencil", RL_HISTORY, RL_ID, .of = "stencil", .help = "the previous materials", .optional = true},
     {"last_count", RL_HISTORY, RL_SCALAR, .of = "count", .help = "frames in the previous result"},
+    {"moved", RL_SCRATCH, RL_VEC2, .help = "motion as depth, cameras and colours show it", .without = "motion"},
     {"color", RL_WRITE, RL_RGB, .help = "anti-aliased, scene-linear"},
     {"count", RL_WRITE, RL_SCALAR,
      .help = "frames in the pixel, this one included; negative: it follows an edge in front"},
 };
 
-static const rl_step steps[] = {{"taa", .domain = RL_EVERY_VECTOR}};
+static const rl_step steps[] = {
+    {"taa_motion", .domain = RL_EVERY_VECTOR, .without = "motion"},
+    {"taa", .domain = RL_EVERY_VECTOR},
+};
 
 static double least_share(const void *values)
 {
@@ -48,7 +52,7 @@ const rl_pass rl_pass_taa = {
     .help = "temporal anti-aliasing with variance clipping",
     .source = "Salvi 2016; Karis 2014; Yang et al. 2020",
     .kernel = "taa.cl",
-    .kernel_prelude = "temporal.cl",
+    .kernel_prelude = "temporal.cl taa_motion.cl",
     .params = RL_ARRAY(params),
     .params_size = sizeof(taa_params),
     .ports = RL_ARRAY(ports),

@@ -2,6 +2,7 @@
 
 #include <limits.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "graph/model/graph_build.h"
 #include "graph/model/params.h"
@@ -133,6 +134,15 @@ static void buffer_image(rl_planner *p, int index)
                          : plan->now[RL_LINEAR];
 }
 
+/* Whether nothing feeds the port that `without` names; NULL: no such condition. */
+static bool is_without(const rl_graph_node *node, const char *without)
+{
+    for (size_t i = 0; without && i < node->pass->ports.n; i++)
+        if (node->pass->ports.rows[i].role == RL_READ && !strcmp(node->pass->ports.rows[i].name, without))
+            return node->images[i] < 0;
+    return true;
+}
+
 /* The buffers of a live node's ports; its scratch comes into being here. */
 static rl_code buffer_node(rl_planner *p, size_t place)
 {
@@ -147,7 +157,7 @@ static rl_code buffer_node(rl_planner *p, size_t place)
         const rl_port *port = &node->pass->ports.rows[i];
         const rl_image_plan *image = node->images[i] >= 0 ? &p->images[node->images[i]] : NULL;
         bound[i] = -1;
-        if (port->role == RL_SCRATCH) {
+        if (port->role == RL_SCRATCH && is_without(node, port->without)) {
             const char *name = rl_arena_printf(p->arena, "%s.%s", node->name, port->name);
             if (!name)
                 return rl_fail_memory(p->err, 64);
@@ -271,9 +281,11 @@ static rl_code make_steps(rl_planner *p)
             code = add_conversion(p, list[next].image);
         if (i == p->n_live)
             break;
-        const rl_pass *pass = p->graph->nodes[p->order[i]].pass;
+        const rl_graph_node *node = &p->graph->nodes[p->order[i]];
+        const rl_pass *pass = node->pass;
         for (size_t s = 0; s < pass->steps.n; s++) {
-            if (!rl_step_runs(pass, &pass->steps.rows[s], p->graph->nodes[p->order[i]].params))
+            if (!rl_step_runs(pass, &pass->steps.rows[s], node->params) ||
+                !is_without(node, pass->steps.rows[s].without))
                 continue;
             p->steps[p->n_steps++] =
                 (rl_plan_step){RL_STEP_KERNEL, p->order[i], (int)s, p->nodes[i].buffers, (int)pass->ports.n};
