@@ -7,6 +7,7 @@
 #define SLIDES          0.25f          /* pixels a frame: an edge that moves faster over what is behind it leaves it behind */
 #define MOST            5              /* of 9: a half plane that covers the middle leaves at most 4 */
 #define EDGE_FRAMES     4.0f           /* what history is worth at a moving edge: that of what turns is not where its surface was */
+#define RESAMPLED_FRAMES 6.0f          /* what history between pixels is worth: each frame resamples it again, and loses detail */
 #define COUNT_MAX       65536.0f       /* a frame's weight in a plain mean never gets below 1/COUNT_MAX */
 #define STILL           3.0f           /* the box is this much wider where nothing moves: jitter alone scatters colours */
 
@@ -191,7 +192,8 @@ kernel void taa(global const float *color, global const float *depth, global con
             mask &= ~((n < 0.0f) & (place.alone | (place.behind & ~place.follows)));
             if (!rl_any(mask))
                 continue;
-            n = rl_select(fabs(n), fmin(fabs(n), EDGE_FRAMES), place.edge & ~still);
+            n = rl_select(fabs(n), fmin(fabs(n), RESAMPLED_FRAMES), (tx != 0.0f) | (ty != 0.0f));
+            n = rl_select(n, fmin(n, EDGE_FRAMES), place.edge & ~still);
             if (whole)
                 for (int c = 0; c < 3; c++)
                     past[c] = tap(h.color + c * f->plane, f, hx, hy);

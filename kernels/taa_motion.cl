@@ -4,6 +4,8 @@
  * is searched that makes history and frame agree: whole pixels by trial, their parts by least squares (Lucas and Kanade
  * 1981). What moved and is not found has no history. Only green is compared. */
 
+#if !HAS_motion
+
 #define TILE_W       16
 #define TILE_H       16
 #define TILE_ACROSS  (TILE_W / RL_W)
@@ -165,12 +167,14 @@ static inline float search(const tile_t *t, float *s)
     EACH_VECTOR(v)
         want[v] = expected(t, v);
     int bx = 0, by = 0;
-    float first = difference(t, want, most, 0, 0), best = first;
-    for (int step = 2; step; step--) {
-        int cx = bx, cy = by, reach = step == 2 ? REACH : 1;
+    float first = 0.0f, best = 0.0f;
+    for (int step = 3; step; step--) { /* 3: none at all */
+        int cx = bx, cy = by, reach = step == 3 ? 0 : step == 2 ? REACH : 1;
         for (int j = -reach; j <= reach; j += step) {
             for (int i = -reach; i <= reach; i += step) {
                 float e = difference(t, want, most, cx + i, cy + j);
+                if (step == 3)
+                    first = best = e;
                 bx = e < best ? cx + i : bx;
                 by = e < best ? cy + j : by;
                 best = fmin(best, e);
@@ -179,7 +183,7 @@ static inline float search(const tile_t *t, float *s)
     }
     for (int i = 0; i < 6; i++)
         s[i] = 0.0f;
-    for (int turn = 0;; turn++) {
+    _Pragma("unroll 1") for (int turn = 0;; turn++) {
         best = fine_difference(t, want, most, bx, by, s, normal);
         if (turn == TURNS)
             break;
@@ -222,9 +226,9 @@ static inline intv was_elsewhere(const tile_t *t, global const float *depth, int
     floatv oy = (float)t->by + (f->previous.jitter[1] - f->camera.jitter[1]) - t->dy[v];
     floatv off = far_if_empty(tap(t->last_depth, f, x + t->bx, y + t->by)) - fma(gx, ox, fma(gy, oy, then));
     floatv most = fma((floatv)DEPTH_SLACK, fabs(gx) + fabs(gy), fma((floatv)DEPTH_NOISE, then, bend));
-    intv other = 0;
+    intv other = off < -0.04f * then;
 #if HAS_stencil
-    other = rl_load_id_edge(t->last_stencil, f, x + t->bx, y + t->by) != t->id;
+    other |= rl_load_id_edge(t->last_stencil, f, x + t->bx, y + t->by) != t->id;
 #endif
     return t->inner[v] & ((off > most) | (~other & (off < -most)));
 }
@@ -237,8 +241,8 @@ static inline float still_difference(const tile_t *t, int apart)
     EACH_VECTOR(v) {
         floatv off = expected(t, v) - history(t, v, 0, 0);
         intv same = of_material(t, v, 0, 0);
-        for (int i = -1; apart && i < 2; i += 2)
-            same &= of_material(t, v, i, 0) & of_material(t, v, 0, i);
+        for (int i = 0; i < 4 && apart; i++)
+            same &= of_material(t, v, (i & 1) * (i - 2), (~i & 1) * (i - 1));
         sum += rl_select(0.0f, off * off, same);
     }
     return sum_lanes(sum);
@@ -252,8 +256,10 @@ static inline int has_moved(const tile_t *t, global const float *depth)
         elsewhere += rl_select(0.0f, 1.0f, was_elsewhere(t, depth, v));
     if (sum_lanes(elsewhere) > MOVED_SHARE * t->lanes)
         return 2;
-    float most = APART * t->slopes;
-    return still_difference(t, 0) > most && still_difference(t, 1) > most;
+    int apart = 0;
+    while (apart < 2 && still_difference(t, apart) > APART * t->slopes)
+        apart++;
+    return apart == 2;
 }
 
 /* Fills t for material `id`, whose lanes `mine` are. */
@@ -352,3 +358,5 @@ kernel void taa_motion(global const float *color, global const float *depth, glo
         rl_store(t.dy[v], moved + f->plane, at);
     }
 }
+
+#endif

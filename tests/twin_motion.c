@@ -151,7 +151,7 @@ static bool was_elsewhere(const tile *t, int i, int j)
     double oy = t->by + (double)b->jitter[1] - (double)a->jitter[1] - t->p[j][i].dy;
     double off = twin_depth(run, TAA_LAST_DEPTH, x + t->bx, y + t->by) - (then + gx * ox + gy * oy);
     double most = 0.25 * (fabs(gx) + fabs(gy)) + 2e-3 * then + bend;
-    bool other = id_at(run, TAA_LAST_STENCIL, x + t->bx, y + t->by) != t->id;
+    bool other = off < -0.04 * then || id_at(run, TAA_LAST_STENCIL, x + t->bx, y + t->by) != t->id;
     return off > most || (!other && off < -most);
 }
 

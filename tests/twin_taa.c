@@ -223,7 +223,8 @@ void twin_taa(const shade_run *run, int x, int y, double *out)
     double n = twin_tap(run, TAA_LAST_COUNT, 0, nx, ny);
     if (!shows(run, nx, ny, px, py, id, &at) || (n < 0 && (at.alone || (at.behind && !at.follows))))
         return;
-    n = at.edge && !at.still ? fmin(fabs(n), 4) : fabs(n);
+    n = at.d[0] != floor(at.d[0]) || at.d[1] != floor(at.d[1]) ? fmin(fabs(n), 6) : fabs(n);
+    n = at.edge && !at.still ? fmin(n, 4) : n;
     for (int c = 0; c < 3; c++)
         past[c] = resample(run, c, px, py);
     double alpha = fmax(1 / (1 + n), p->blend), brightest = clip(run, x, y, at.still, past);

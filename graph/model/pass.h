@@ -177,9 +177,9 @@ typedef struct rl_port {
         *needed_by; /* optional READ: "diffuse: sg" is a shading key of this pass and a word of it; a material
                        with a profile and that word makes the port required (graph.h); NULL = none does */
     const char *without; /* SCRATCH: an optional port; there is memory only where nothing feeds that */
-    const char *of; /* HISTORY: the port (own output first, else own input) whose past this is */
-    rl_layout layout; /* the layout that the kernel wants; the plan inserts the conversion */
-    bool any_layout;  /* WRITE: the kernel stores through RL_STORE, so the plan may choose (LAYOUT_NAME) */
+    const char *of;      /* HISTORY: the port (own output first, else own input) whose past this is */
+    rl_layout layout;    /* the layout that the kernel wants; the plan inserts the conversion */
+    bool any_layout;     /* WRITE: the kernel stores through RL_STORE, so the plan may choose (LAYOUT_NAME) */
 } rl_port;
 
 /* ---- steps --------------------------------------------------------------------------------------------- */
