@@ -11,6 +11,8 @@
 #define TILE_ACROSS  (TILE_W / RL_W)
 #define TILE_N       (TILE_ACROSS * TILE_H) /* vectors */
 #define EACH_VECTOR(v) _Pragma("unroll 1") for (int v = 0; v < TILE_N; v++)
+#define EACH_LOOKED_AT(t, v) EACH_VECTOR(v) if (!(v / TILE_ACROSS & (t)->skip))
+#define SKIP         3                      /* rows between those that tell whether a look at all of them is worth it */
 #define REACH        8                      /* pixels that are searched, to each side */
 #define LEAST_LANES  8                      /* of a material in a tile; fewer tell nothing */
 #define DEPTH_NOISE  2e-3f                  /* of the depth: what half floats round away, twice */
@@ -30,6 +32,7 @@ typedef struct tile_t {
     global const float *last_color, *last_depth; /* green */
     global const uint *last_stencil;
     int x, y, rows; /* its first pixel; rows of it in the buffer */
+    int skip;       /* 0, or SKIP: only every fourth row is looked at */
     uint id;
     int bx, by;     /* displacement by the camera, whole pixels */
     intv inner[TILE_N];                              /* lanes of the material, as are the four pixels around */
@@ -238,7 +241,7 @@ static inline intv was_elsewhere(const tile_t *t, global const float *depth, int
 static inline float still_difference(const tile_t *t, int apart)
 {
     floatv sum = 0.0f;
-    EACH_VECTOR(v) {
+    EACH_LOOKED_AT(t, v) {
         floatv off = expected(t, v) - history(t, v, 0, 0);
         intv same = of_material(t, v, 0, 0);
         for (int i = 0; i < 4 && apart; i++)
@@ -252,7 +255,7 @@ static inline float still_difference(const tile_t *t, int apart)
 static inline int has_moved(const tile_t *t, global const float *depth)
 {
     floatv elsewhere = 0.0f;
-    EACH_VECTOR(v)
+    EACH_LOOKED_AT(t, v)
         elsewhere += rl_select(0.0f, 1.0f, was_elsewhere(t, depth, v));
     if (sum_lanes(elsewhere) > MOVED_SHARE * t->lanes)
         return 2;
@@ -267,7 +270,7 @@ static inline void look_at(tile_t *t, global const float *green, global const ui
 {
     floatv sum = 0.0f, slopes = 0.0f, dx = 0.0f, dy = 0.0f;
     t->id = id;
-    EACH_VECTOR(v) {
+    EACH_LOOKED_AT(t, v) {
         int x = tile_x(t, v), y = tile_y(t, v);
         t->inner[v] = mine[v];
 #if HAS_stencil
@@ -332,8 +335,13 @@ kernel void taa_motion(global const float *color, global const float *depth, glo
             mine[v] = left[v] == next;
             left[v] = select(left[v], (uintv)0, mine[v]);
         }
-        look_at(&t, color + f->plane, stencil, mine, next - 1);
-        int what = t.lanes < LEAST_LANES ? 0 : has_moved(&t, depth);
+        int what = 0;
+        for (t.skip = SKIP;; t.skip = 0) {
+            look_at(&t, color + f->plane, stencil, mine, next - 1);
+            what = t.lanes < LEAST_LANES ? 0 : has_moved(&t, depth);
+            if (!t.skip || (!what && t.lanes >= LEAST_LANES))
+                break;
+        }
         if (!what)
             continue;
         float s[6];

@@ -8,7 +8,7 @@ enum { SIDE = 16, REACH = 8, LEAST = 8, TURNS = 2 };
 /* A tile and one material of it. */
 typedef struct tile {
     const shade_run *run;
-    int x, y, rows, bx, by;
+    int x, y, rows, bx, by, skip;
     uint32_t id;
     double lanes, slopes;
     struct {
@@ -187,8 +187,8 @@ static void look_at(tile *t, uint32_t id)
         int i = k % SIDE, j = k / SIDE, x = t->x + i, y = t->y + j;
         double z = twin_depth(t->run, TAA_DEPTH, x, y), d[2];
         twin_follow(f, x, y, z, d, &t->p[j][i].then);
-        bool mine = j < t->rows && in_image(f, x, y) && z < 1e18 && fmax(fabs(d[0]), fabs(d[1])) < 16384 &&
-                    id_at(t->run, TAA_STENCIL, x, y) == id;
+        bool mine = j < t->rows && !(j & t->skip) && in_image(f, x, y) && z < 1e18 &&
+                    fmax(fabs(d[0]), fabs(d[1])) < 16384 && id_at(t->run, TAA_STENCIL, x, y) == id;
         t->p[j][i].mine = mine;
         t->p[j][i].inner = mine && id_at(t->run, TAA_STENCIL, x - 1, y) == id &&
                            id_at(t->run, TAA_STENCIL, x + 1, y) == id &&
@@ -227,8 +227,13 @@ void twin_motion(const shade_run *run, int x, int y, double *out)
     twin_follow(f, x, y, twin_depth(run, TAA_DEPTH, x, y), out, &then);
     if (twin_depth(run, TAA_DEPTH, x, y) >= 1e18 || fmax(fabs(out[0]), fabs(out[1])) >= 16384)
         return;
-    look_at(&t, id_at(run, TAA_STENCIL, x, y));
-    int what = t.lanes < LEAST ? 0 : has_moved(&t);
+    int what = 0;
+    for (t.skip = 3;; t.skip = 0) { /* every fourth row; all of them when those tell nothing, or of motion */
+        look_at(&t, id_at(run, TAA_STENCIL, x, y));
+        what = t.lanes < LEAST ? 0 : has_moved(&t);
+        if (!t.skip || (!what && t.lanes >= LEAST))
+            break;
+    }
     if (!what)
         return;
     if (search(&t, s) > 0.5) {
