@@ -10,6 +10,7 @@
 #include <string.h>
 #include <cmocka.h>
 
+#include "graph/run/camera.h"
 #include "tests/temporal_run.h"
 
 static void run_on(const temporal_scene *scene, bool motion, int frames, int compared, temporal_report *r)
@@ -196,8 +197,32 @@ static void camera_jumps_end_history(void **state)
     assert_int_equal(step(&s, 3, 0.001, 0.001), 3);
     assert_int_equal(step(&s, 4, 0.001, 0.601), 1); /* 34 degrees */
     assert_int_equal(step(&s, 5, 0.001, 0.601), 2);
-    assert_int_equal(step(&s, 6, 11, 0.601), 1); /* 11 metres */
+    assert_int_equal(step(&s, 6, 3, 0.601), 1); /* 3 metres, past all that is seen, 2 metres away */
     end(&s);
+}
+
+/* How far a jump is depends on how far away things are. */
+static void jumps_are_a_matter_of_scale(void **state)
+{
+    float depth[32 * 32];
+    const rl_depth_view view = {depth, 32, 0, 0, 32, 32};
+    camera_t a = {.to_view = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0},
+                  .to_world = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0},
+                  .focal = {32, 32},
+                  .centre = {16, 16}};
+    camera_t b = a;
+    (void)state;
+    b.to_view[3] = -0.5f; /* half a metre to the right */
+    b.to_world[3] = 0.5f;
+    for (int scale = 0; scale < 3; scale++) {
+        for (int i = 0; i < 32 * 32; i++)
+            depth[i] = (float[]){0.4f, 1, 100}[scale];
+        double seen = rl_camera_share_seen(&b, &a, &view);
+        assert_true(fabs(seen - (double[]){0, 0.5, 1}[scale]) < 0.07);
+        assert_true(rl_camera_share_seen(&a, &a, &view) == 1);
+    }
+    memset(depth, 0, sizeof depth);
+    assert_true(rl_camera_share_seen(&b, &a, &view) == 1);
 }
 
 /* Another size: history is empty, and works again from there. */
@@ -286,11 +311,12 @@ static void missing_motion_is_said_once(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(still_frames_reach_the_truth), cmocka_unit_test(moving_frames_approach_the_truth),
-        cmocka_unit_test(fine_detail_survives_motion),  cmocka_unit_test(no_trail_behind_an_edge),
-        cmocka_unit_test(gaps_and_cuts_end_history),    cmocka_unit_test(camera_jumps_end_history),
-        cmocka_unit_test(another_size_ends_history),    cmocka_unit_test(excluded_materials_stay_current),
-        cmocka_unit_test(unknown_materials_are_errors), cmocka_unit_test(missing_motion_is_said_once),
+        cmocka_unit_test(still_frames_reach_the_truth),    cmocka_unit_test(moving_frames_approach_the_truth),
+        cmocka_unit_test(fine_detail_survives_motion),     cmocka_unit_test(no_trail_behind_an_edge),
+        cmocka_unit_test(gaps_and_cuts_end_history),       cmocka_unit_test(camera_jumps_end_history),
+        cmocka_unit_test(jumps_are_a_matter_of_scale),     cmocka_unit_test(another_size_ends_history),
+        cmocka_unit_test(excluded_materials_stay_current), cmocka_unit_test(unknown_materials_are_errors),
+        cmocka_unit_test(missing_motion_is_said_once),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
