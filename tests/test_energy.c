@@ -82,6 +82,7 @@ static double square_weight(int dx, int dy, double d)
 typedef struct stencil_weights {
     int n, dx[8192], dy[8192];
     double w[3][8192];
+    double share[3]; /* of the result; the rest is the pixel's own light */
 } stencil_weights;
 
 static void dense_weights(const twin_material *m, stencil_weights *out)
@@ -89,6 +90,7 @@ static void dense_weights(const twin_material *m, stencil_weights *out)
     const float *d = m->scatter_distance_mm;
     double reach = RL_BURLEY_RADIUS * (double)fmaxf(d[0], fmaxf(d[1], d[2]));
     out->n = 0;
+    out->share[0] = out->share[1] = out->share[2] = 1;
     for (int dy = -40; dy <= 40; dy++)
         for (int dx = -40; dx <= 40; dx++) {
             if (hypot(dx, dy) > reach)
@@ -101,19 +103,29 @@ static void dense_weights(const twin_material *m, stencil_weights *out)
         }
 }
 
-/* rotation: none, so that each pixel has the same taps. */
+/* rotation: none, so that each pixel has the same taps: the middle one of fifteen patterns. */
 static void tap_weights(const twin_material *m, int n, stencil_weights *out)
 {
+    enum { PATTERNS = 15 };
     const float *d = m->scatter_distance_mm;
-    double most = fmaxf(d[0], fmaxf(d[1], d[2]));
+    double most = fmaxf(d[0], fmaxf(d[1], d[2])), sum[3], mean[3] = {0};
+    const double proportions[3] = {d[0] / most, d[1] / most, d[2] / most};
     float x[256], y[256], w[256];
-    rl_burley_taps((size_t)n, 0.5, x, y, w);
+    for (int p = 0; p < PATTERNS; p++) {
+        rl_burley_mixture_taps((size_t)n, (p + 0.5) / PATTERNS, proportions, x, y, w, sum);
+        for (int c = 0; c < 3; c++)
+            mean[c] += sum[c] / PATTERNS;
+    }
+    rl_burley_mixture_taps((size_t)n, 0.5, proportions, x, y, w, sum);
     out->n = n;
+    for (int c = 0; c < 3; c++)
+        out->share[c] = sum[c] / mean[c];
     for (int i = 0; i < n; i++) {
         out->dx[i] = (int)nearbyint((double)x[i] * most);
         out->dy[i] = (int)nearbyint((double)y[i] * most);
         for (int c = 0; c < 3; c++)
-            out->w[c][i] = rl_burley_profile(hypot((double)x[i], (double)y[i]) * most, d[c]) * d[c] * w[i];
+            out->w[c][i] =
+                rl_burley_profile(hypot((double)x[i], (double)y[i]), proportions[c]) * proportions[c] * w[i];
     }
 }
 
@@ -143,12 +155,14 @@ static void account(const sss_scene *s, const stencil_weights *f, int x, int y, 
             }
         }
         double all = same + border + outside, own = s->diffuse[c * s->n + i];
-        double given = light / (sss_materials[id].border == OCCLUDE ? all : same);
+        double share = f->share[c], seen = light / (sss_materials[id].border == OCCLUDE ? all : same);
+        double given = own + share * (seen - own);
         sum->in[c] += e * own;
-        sum->out[c] += e * given;
-        sum->border[c] += e * own * border / all;
-        sum->off_screen[c] += e * own * outside / all;
-        sum->redistributed[c] += e * (given - light / all);
+        sum->out[c] += e * fmax(given, 0);
+        sum->border[c] += e * share * own * border / all;
+        sum->off_screen[c] += e * share * own * outside / all;
+        sum->clamped[c] += e * fmin(given, 0);
+        sum->redistributed[c] += e * share * (seen - light / all);
     }
     sum->pixels++;
 }
