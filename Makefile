@@ -49,9 +49,9 @@ LIB_CXX := $(filter-out $(MODULE_CXX),$(wildcard graph/run/*.cc))
 TOOL_C  := $(wildcard graph/tool/*.c)
 KERNELS := kernels/shared.h $(wildcard kernels/*.cl)
 LIB_O   := $(LIB_C:%.c=$(BUILD)/%.o) $(LIB_CXX:%.cc=$(BUILD)/%.o) $(BUILD)/kernels.o
-# The page of `relit ab`: in the order in which its scripts run.
+# The pages of `relit ab` and `relit plan`.
 PAGE    := $(addprefix graph/tool/page/,page.html page.css $(addsuffix .js,text decode display look look_gl look_2d \
-             viewer viewer_input readout plot tables graph sections main))
+             viewer viewer_input readout plot tables graph sections main plan) plan.html)
 TOOL_O  := $(TOOL_C:%.c=$(BUILD)/%.o) $(BUILD)/page.o
 MAIN_O  := $(BUILD)/graph/tool/relit.o
 TESTS   := $(patsubst tests/%.c,$(BUILD)/tests/%,$(wildcard tests/test_*.c))

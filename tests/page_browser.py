@@ -97,7 +97,7 @@ class Browser:
 
     def settle(self):
         """Until the viewer has drawn what it was asked for."""
-        script = """const v = document.getElementById('viewer'), done = arguments[arguments.length - 1];
+        script = """const v = document.getElementById('viewer') || document.body, done = arguments[arguments.length - 1];
             let quiet = 0, last = '';
             const look = () => {
               const now = v.dataset.drawn + '|' + v.hasAttribute('aria-busy');
@@ -578,6 +578,25 @@ def reference_and_failed_frame(p):
     p.b.keys("f", "1")
     p.compare(lambda x, y: srgb(linear(-1, 3, x, y)), 0.6)
     check("reference" in p.text("#pick-a") and "<b>No such file</b>" in p.text("#failures"), "reference and failure")
+
+
+@test
+def plan_page(p):
+    """relit plan --format html: graph, times, lifetimes, memory."""
+    p.open("plan.html")
+    check(p.text("h1") == "skin.yaml" and "8.0" in p.text("#facts"), "title and peak memory")
+    names = p.b.js("return [...document.querySelectorAll('.node .name')].map(e => e.textContent)")
+    check(names == ["capture", "light", "a</script>a"], f"nodes {names}")
+    check(p.b.js("return document.querySelectorAll('.edge').length") == 3 and p.b.js("return document.querySelectorAll('.edge.history').length") == 1, "edges")
+    times = p.b.js("return [...document.querySelectorAll('.time .value')].map(e => e.textContent)")
+    check(times == ["5.00", "1.50", "0.500"], f"times {times}")
+    check("2.0" in p.b.js("return document.querySelectorAll('.node .ms')[1].textContent"), "a node's time is that of its steps")
+    bars = p.b.js("return [...document.querySelectorAll('.life rect')].map(e => e.getAttribute('width') / document.querySelectorAll('.life rect')[2].getAttribute('width'))")
+    check(len(bars) == 3 and abs(bars[0] - 0.25) < 0.02 and abs(bars[1] - 0.75) < 0.02, f"lifetimes {bars}")
+    check("7.0" in p.text("#memory") and "idle" in p.text("#graph"), "memory, and what is left out")
+    p.b.size(360, 740, 2, True)
+    p.open("plan.html")
+    check(p.b.js("return document.documentElement.scrollWidth") == 360, "it fits a phone")
 
 
 def run_quiet(p, name):

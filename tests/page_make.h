@@ -32,4 +32,8 @@ double page_make_mean(int index, int pair);
 /* Makes frames, then the page; *out is what rl_ab_page_write says. */
 rl_code page_make(const page_make_options *options, rl_ab_page_summary *out, rl_error *err);
 
+/* A page of `relit plan --format html`: two nodes, the second of that name; with `trace`, a file that is
+ * written there, it shows times: 5 ms for the first step, 1.5 and 0.5 for the other's. */
+rl_code page_make_plan(const char *path, const char *trace, const char *node, rl_error *err);
+
 #endif

@@ -340,6 +340,10 @@ static void test_wrong(void **state)
         {{"--vary", "graph.sss.taps=8,16", "--sheet=a.nothing"}, "'.nothing'"},
         {{"--vary", "graph.sss.taps=8,16", "--against", "/nowhere/at/all"}, "/nowhere/at/all"},
         {{"--vary", "graph.sss.taps=8,16", "--report-frames", "frist"}, "frist"},
+        {{"--vary", "graph.sss.taps=8,16", "--set", "outputs.preview.file=../{capture}.{frame}.png"},
+         "output 'preview': variants 'taps_8' and 'taps_16' would both write '"},
+        {{"--vary", "graph.sss.taps=8,16", "--set", "outputs.preview.file=/nowhere/{frame}.png"},
+         "would both write '/nowhere/1.png'; put {variant} into 'file'"},
         {{"/nowhere.yaml"}, "/nowhere.yaml: error: cannot be opened"},
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {

@@ -17,6 +17,7 @@
 #include "graph/base/alloc.h"
 #include "graph/base/file.h"
 #include "graph/tool/ab_page_parts.h"
+#include "graph/tool/plan_page.h"
 #include "tests/page_make.h"
 
 static char folder[256];
@@ -332,6 +333,30 @@ static void metrics_must_be_an_object(void **state)
     rl_ab_page_free(&page);
 }
 
+/* ---- relit plan ---------------------------------------------------------------------------------------- */
+
+static void plans_show_times_of_a_trace(void **state)
+{
+    (void)state;
+    rl_error err = {0};
+    char *text;
+    size_t size;
+    assert_int_equal(page_make_plan(in_folder("p.html"), in_folder("t.json"), "aa", &err), RL_OK);
+    assert_int_equal(rl_file_read(in_folder("p.html"), &text, &size, &err), RL_OK);
+    assert_non_null(strstr(text, "{\"frames\":2,\"spans\":{\"kernel light: lighting\":{\"ms\":5},"
+                                 "\"kernel aa: taa_0\":{\"ms\":1.5},\"kernel aa: taa_1\":{\"ms\":0.5}}}"));
+    rl_free(text);
+    static const char *const bad[] = {"", "[]", "{\"traceEvents\":[]}", "{\"traceEvents\":[{\"cat\":1}]}"};
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+        rl_str out = {0};
+        assert_int_equal(rl_file_write(in_folder("bad.json"), bad[i], strlen(bad[i]), &err), RL_OK);
+        assert_int_equal(rl_plan_page("x", "{}", in_folder("bad.json"), &out, &err), RL_E_FORMAT);
+        assert_string_equal(err.file, in_folder("bad.json"));
+        rl_str_free(&out);
+        err = (rl_error){0};
+    }
+}
+
 /* ---- the browser --------------------------------------------------------------------------------------- */
 
 /* What tests/page_browser.py says, a line a test. */
@@ -351,6 +376,9 @@ static void run_browser(void)
     o.reference = o.plain = true;
     o.failed = 1;
     assert_int_equal(page_make(&o, &got, &err), RL_OK);
+
+    assert_int_equal(page_make_plan(in_folder("plan.html"), in_folder("trace.json"), "a</script>a", &err),
+                     RL_OK);
 
     char command[512];
     snprintf(command, sizeof command, "python3 tests/page_browser.py '%s' 2>&1", folder);
@@ -373,7 +401,7 @@ static void works_in_a_browser(void **state)
     if (browser_status)
         print_error("%s", browser_says);
     assert_int_equal(browser_status, 0);
-    assert_int_equal(count(browser_says, "passed "), 25);
+    assert_int_equal(count(browser_says, "passed "), 26);
 }
 
 static int make_folder(void **state)
@@ -399,7 +427,7 @@ int main(void)
         cmocka_unit_test(tables_are_exact_at_entries), cmocka_unit_test(holds_what_matters),
         cmocka_unit_test(keeps_to_its_budget),         cmocka_unit_test(leaves_nothing_behind),
         cmocka_unit_test(survives_lack_of_memory),     cmocka_unit_test(metrics_must_be_an_object),
-        cmocka_unit_test(works_in_a_browser),
+        cmocka_unit_test(plans_show_times_of_a_trace), cmocka_unit_test(works_in_a_browser),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

@@ -13,16 +13,18 @@ const rl_metric rl_page_maps[RL_PAGE_MAPS] = {RL_METRIC_FLIP, RL_METRIC_HDRFLIP}
 typedef struct job {
     const rl_compared_image *image; /* half floats; or */
     bool encoded;                   /* the image is: it is decoded from sRGB */
+    const rl_compared_image *base;  /* its bits may be taken as differences to this one's */
     const float *map;               /* 0 … 1; or */
     const uint32_t *ids;
     size_t stride;
     int bits, planes, width, height;
+    bool based;      /* that was smaller */
     uint8_t *packed; /* owned */
     size_t size;
     rl_error error;
 } job;
 
-static rl_code fill_halves(const job *j, uint16_t *out, rl_error *err)
+static rl_code fill_halves(const job *j, const rl_compared_image *image, uint16_t *out, rl_error *err)
 {
     const rl_exr_kernels *kernels = rl_exr_kernels_best();
     size_t width = (size_t)j->width;
@@ -31,7 +33,7 @@ static rl_code fill_halves(const job *j, uint16_t *out, rl_error *err)
         return rl_fail_memory(err, width * sizeof *row);
     for (int c = 0; c < 3; c++)
         for (size_t y = 0; y < (size_t)j->height; y++, out += width) {
-            const float *in = j->image->plane[c] + y * j->image->stride;
+            const float *in = image->plane[c] + y * image->stride;
             for (size_t x = 0; j->encoded && x < width; x++)
                 row[x] = (float)rl_srgb_decode((double)in[x]);
             kernels->float_to_half(j->encoded ? row : in, out, width);
@@ -60,6 +62,35 @@ static void fill_ids(const job *j, void *out)
         }
 }
 
+/* Variants are often alike: their differences may be packed instead. */
+static void pack_difference(job *j, uint16_t *halves)
+{
+    size_t n = 3 * (size_t)j->width * (size_t)j->height, size = 0;
+    uint16_t *base = rl_malloc(n * sizeof *base);
+    uint8_t *packed = NULL;
+    if (!base) {
+        rl_fail_memory(&j->error, n * sizeof *base);
+        return;
+    }
+    job plain = *j;
+    plain.encoded = false;
+    if (!fill_halves(&plain, j->base, base, &j->error)) {
+        for (size_t i = 0; i < n; i++)
+            base[i] = (uint16_t)(halves[i] - base[i]);
+        rl_page_plain difference = {j->bits, j->planes, j->width, j->height, base};
+        rl_page_pack(&difference, &packed, &size, &j->error);
+    }
+    if (packed && size < j->size) {
+        rl_free(j->packed);
+        j->packed = packed;
+        j->size = size;
+        j->based = true;
+        packed = NULL;
+    }
+    rl_free(packed);
+    rl_free(base);
+}
+
 static void pack_job(void *ctx, int i)
 {
     job *j = (job *)ctx + i;
@@ -72,7 +103,7 @@ static void pack_job(void *ctx, int i)
         return;
     }
     if (j->image)
-        fill_halves(j, data, &j->error);
+        fill_halves(j, j->image, data, &j->error);
     else if (j->map)
         fill_map(j, data);
     else
@@ -80,6 +111,8 @@ static void pack_job(void *ctx, int i)
     rl_page_plain plain = {j->bits, j->planes, j->width, j->height, data};
     if (!j->error.code)
         rl_page_pack(&plain, &j->packed, &j->size, &j->error);
+    if (!j->error.code && j->base)
+        pack_difference(j, data);
     rl_free(data);
 }
 
@@ -105,6 +138,7 @@ static void list_jobs(const rl_ab_page *page, const rl_ab_page_input *input, job
         jobs[i].bits = 16;
         jobs[i].planes = 3;
         jobs[i].image = i < listed ? &f->images[i][RL_COMPARED_LINEAR] : NULL;
+        jobs[i].base = i ? &f->images[0][RL_COMPARED_LINEAR] : NULL;
     }
     for (int k = RL_COMPARED; input->reference && k-- > 0;)
         if (input->reference[k].plane[0]) { /* LINEAR is looked at last, and is better */
@@ -141,7 +175,7 @@ static rl_code store(rl_ab_page *page, const job *jobs, size_t n, rl_page_held *
     off_t at = out->extent.at;
     for (size_t i = 0; i < n && !code; i++) {
         const job *j = &jobs[i];
-        out->blocks[i] = (rl_page_block){at, j->size, j->bits, j->planes, j->width, j->height};
+        out->blocks[i] = (rl_page_block){at, j->size, j->bits, j->planes, j->width, j->height, j->based};
         if (j->size)
             code = rl_page_spool_write(&page->spool, at, j->packed, j->size, err);
         at += (off_t)j->size;

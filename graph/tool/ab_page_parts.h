@@ -7,6 +7,7 @@
 #include "graph/base/text.h"
 #include "graph/model/frames.h"
 #include "graph/tool/ab_page.h"
+#include "graph/tool/page_source.h"
 
 /* ---- blocks of numbers (ab_page_pack.c) ---- */
 
@@ -27,11 +28,6 @@ size_t rl_page_pack_bound(const rl_page_plain *plain);
 /* RFC 4648, with padding: out has room for rl_page_base64_size(n) bytes, not terminated. */
 size_t rl_page_base64_size(size_t n);
 void rl_page_base64(const uint8_t *in, size_t n, char *out);
-
-/* A text between quotes in JSON that is safe inside of <script>; bytes that are no UTF-8 become U+FFFD. */
-void rl_page_json_text(rl_str *out, const char *text);
-/* A text in HTML, between tags or in a quoted attribute; the same about UTF-8. */
-void rl_page_html_text(rl_str *out, const char *text);
 
 /* ---- displays as tables (ab_page_lut.c) ---- */
 
@@ -68,6 +64,7 @@ typedef struct rl_page_block {
     off_t at; /* in the spool */
     size_t size;
     int bits, planes, width, height;
+    bool based; /* the frame's first block has to be added, modulo 2^bits */
 } rl_page_block;
 
 typedef struct rl_page_seen {
@@ -145,13 +142,5 @@ extern const rl_metric rl_page_maps[RL_PAGE_MAPS];
 
 /* A path as seen from a folder. */
 void rl_page_relative(const char *folder, const char *path, rl_str *out);
-
-/* ---- the sources of the page ($(BUILD)/page.c, made from graph/tool/page/) ---- */
-
-typedef struct rl_embedded_text {
-    const char *name; /* "page.css" */
-    const unsigned char *text;
-} rl_embedded_text;
-extern const rl_embedded_text rl_embedded_page[];
 
 #endif

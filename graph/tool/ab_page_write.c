@@ -41,13 +41,18 @@ static void put_number(rl_str *s, double value)
 
 /* ---- what the page is told besides metrics.json -------------------------------------------------------- */
 
-static void add_block(rl_str *s, const rl_page_block *b, size_t id)
+static void add_block(rl_str *s, const rl_page_held *held, size_t i, size_t first)
 {
-    if (b->size)
-        rl_str_printf(s, "{\"id\":%zu,\"bits\":%d,\"planes\":%d,\"width\":%d,\"height\":%d}", id, b->bits,
-                      b->planes, b->width, b->height);
-    else
+    const rl_page_block *b = &held->blocks[i];
+    if (!b->size) {
         rl_str_add(s, "null");
+        return;
+    }
+    rl_str_printf(s, "{\"id\":%zu,\"bits\":%d,\"planes\":%d,\"width\":%d,\"height\":%d", first + i, b->bits,
+                  b->planes, b->width, b->height);
+    if (b->based)
+        rl_str_printf(s, ",\"base\":%zu", first);
+    rl_str_add(s, "}");
 }
 
 static void add_why(rl_str *s, unsigned why)
@@ -76,24 +81,23 @@ static void add_held(const writer *w, rl_str *s, const rl_page_held *held, size_
 {
     const rl_ab_page *page = w->page;
     size_t listed = page->plan->n_listed;
-    const rl_page_block *b = held->blocks;
     rl_str_add(s, ",\"why\":");
     add_why(s, held->why);
     rl_str_add(s, ",\"images\":[");
     for (size_t v = 0; v < listed; v++) {
         rl_str_add(s, v ? "," : "");
-        add_block(s, &b[v], id + v);
+        add_block(s, held, v, id);
     }
     rl_str_add(s, "],\"reference\":");
-    add_block(s, &b[listed], id + listed);
+    add_block(s, held, listed, id);
     rl_str_printf(s, ",\"encoded\":%s,\"ids\":", held->encoded ? "true" : "false");
-    add_block(s, &b[listed + 1], id + listed + 1);
+    add_block(s, held, listed + 1, id);
     rl_str_add(s, ",\"maps\":[");
     for (size_t i = listed + 2; i < held->n_blocks; i++) {
         size_t k = i - listed - 2;
         rl_str_printf(s, "%s{\"pair\":%zu,\"metric\":\"%s\",\"block\":", k ? "," : "", k / RL_PAGE_MAPS,
                       rl_metric_name(rl_page_maps[k % RL_PAGE_MAPS]));
-        add_block(s, &b[i], id + i);
+        add_block(s, held, i, id);
         rl_str_add(s, "}");
     }
     rl_str_add(s, "]");
@@ -231,40 +235,11 @@ static rl_code put_blocks(const writer *w, rl_error *err)
 
 /* ---- the page ------------------------------------------------------------------------------------------ */
 
-static const char *source(const char *name)
-{
-    for (const rl_embedded_text *e = rl_embedded_page; e->name; e++)
-        if (!strcmp(e->name, name))
-            return (const char *)e->text;
-    return "";
-}
-
-static void put_scripts(const writer *w)
-{
-    for (const rl_embedded_text *e = rl_embedded_page; e->name; e++)
-        if (!strcmp(rl_path_extension(e->name), ".js"))
-            put(w, (const char *)e->text);
-}
-
 static void put_html(const writer *w, const char *text)
 {
     rl_str s = {0};
     rl_page_html_text(&s, text);
     put_text(w, &s);
-}
-
-/* In JSON, '<' is in strings only: "</script>" and "<!--" cannot end or change the element around it. */
-static void put_metrics(const writer *w)
-{
-    for (const char *at = w->metrics_text; *at;) {
-        size_t n = strcspn(at, "<");
-        fwrite(at, 1, n, w->file);
-        at += n;
-        if (*at) {
-            put(w, "\\u003c");
-            at++;
-        }
-    }
 }
 
 static void put_title(const writer *w)
@@ -279,41 +254,36 @@ static void put_title(const writer *w)
         fprintf(w->file, " and %zu more", n - named);
 }
 
-static rl_code put_part(const writer *w, const char *name, size_t n, rl_error *err)
+static const char *const scripts[] = {"text.js",     "decode.js",  "display.js", "look.js",
+                                      "look_gl.js",  "look_2d.js", "viewer.js",  "viewer_input.js",
+                                      "readout.js",  "plot.js",    "tables.js",  "graph.js",
+                                      "sections.js", "main.js",    NULL};
+
+static void put_n(void *ctx, const char *text, size_t n)
 {
+    fwrite(text, 1, n, ((const writer *)ctx)->file);
+}
+
+static rl_code put_part(void *ctx, const char *name, size_t n, rl_error *err)
+{
+    const writer *w = ctx;
+    const rl_page_maker maker = {put_n, NULL, ctx};
     const char *summary = json_string_value(json_object_get(w->metrics, "summary"));
     if (!strncmp(name, "title", n))
         put_title(w);
     else if (!strncmp(name, "style", n))
-        put(w, source("page.css"));
+        put(w, rl_page_source("page.css"));
     else if (!strncmp(name, "summary", n))
         put_html(w, summary ? summary : "");
     else if (!strncmp(name, "metrics", n))
-        put_metrics(w);
+        rl_page_put_json(&maker, w->metrics_text);
     else if (!strncmp(name, "page", n))
         put_page(w);
     else if (!strncmp(name, "script", n))
-        put_scripts(w);
+        rl_page_put_scripts(&maker, scripts);
     else if (!strncmp(name, "blocks", n))
         return put_blocks(w, err);
     return RL_OK;
-}
-
-/* Places in page.html are written {{name}}. */
-static rl_code put_all(const writer *w, rl_error *err)
-{
-    rl_code code = RL_OK;
-    for (const char *at = source("page.html"); at && !code;) {
-        const char *open = strstr(at, "{{"), *close = open ? strstr(open, "}}") : NULL;
-        if (!close) {
-            put(w, at);
-            break;
-        }
-        fwrite(at, 1, (size_t)(open - at), w->file);
-        code = put_part(w, open + 2, (size_t)(close - open - 2), err);
-        at = close + 2;
-    }
-    return code;
 }
 
 static rl_code write_file(writer *w, const char *path, unsigned long long *bytes, rl_error *err)
@@ -327,7 +297,8 @@ static rl_code write_file(writer *w, const char *path, unsigned long long *bytes
     w->file = fopen(temp, "wbe");
     if (!w->file)
         return rl_fail_file(err, RL_E_IO, path, "cannot be written: %s", strerror(errno));
-    code = put_all(w, err);
+    const rl_page_maker maker = {put_n, put_part, w};
+    code = rl_page_expand("page.html", &maker, err);
     long size = ftell(w->file);
     bool bad = ferror(w->file) || size < 0;
     bad |= fclose(w->file) != 0;
@@ -345,9 +316,10 @@ static rl_code write_file(writer *w, const char *path, unsigned long long *bytes
 /* What is in the page besides frames, a little more than less. */
 static unsigned long long fixed_bytes(const rl_ab_page *page, const char *metrics)
 {
-    unsigned long long bytes = strlen(metrics) + 4096;
-    for (const rl_embedded_text *e = rl_embedded_page; e->name; e++)
-        bytes += strlen((const char *)e->text);
+    unsigned long long bytes =
+        strlen(metrics) + strlen(rl_page_source("page.html")) + strlen(rl_page_source("page.css")) + 8192;
+    for (const char *const *name = scripts; *name; name++)
+        bytes += strlen(rl_page_source(*name));
     for (size_t i = 0; i < page->source->n_displays; i++)
         bytes += rl_page_base64_size(page->luts[i].size) + 256;
     for (size_t i = 0; i < page->n_seen; i++)

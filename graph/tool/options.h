@@ -38,7 +38,7 @@ typedef struct rl_commands {
     size_t n;
 } rl_commands;
 
-typedef enum rl_plan_word { RL_WORD_TEXT, RL_WORD_DOT, RL_WORD_SVG, RL_WORD_JSON } rl_plan_word;
+typedef enum rl_plan_word { RL_WORD_TEXT, RL_WORD_DOT, RL_WORD_SVG, RL_WORD_JSON, RL_WORD_HTML } rl_plan_word;
 
 /* What was asked for. Lists live in the arena that rl_arguments_parse was given, strings in argv or there. */
 typedef struct rl_arguments {

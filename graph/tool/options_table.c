@@ -72,8 +72,8 @@ const rl_option rl_options_table[] = {
     {"memory-limit", "SIZE", TIMED, RL_TAKES_BYTES, AT(run.memory_limit),
      .help = "most that relit may allocate, such as 512M or 4G;\n"
              "default: no limit"},
-    {"format", "WORD", RL_CMD_PLAN, RL_TAKES_WORD, AT(format), .words = "text|dot|svg|json",
-     .help = "text (default), dot, svg or json"},
+    {"format", "WORD", RL_CMD_PLAN, RL_TAKES_WORD, AT(format), .words = "text|dot|svg|json|html",
+     .help = "text (default), dot, svg, json or html (one page)"},
     {"json", NULL, TIMED | RL_CMD_PASSES | RL_CMD_DEVICES | RL_CMD_DIFF, RL_TAKES_FLAG, AT(json),
      .help = "print JSON on stdout (run, ab: an object a frame,\n"
              "each on its line)"},
@@ -100,9 +100,10 @@ const rl_option rl_options_table[] = {
      .help = "whose pixels report.html holds: a list of first,\n"
              "last, worst, all, none, and frames as in --frames;\n"
              "default: first,last,worst"},
-    {"trace", "F.json", RL_CMD_RUN | RL_CMD_AB, RL_TAKES_TEXT, AT(trace),
+    {"trace", "F.json", RL_CMD_RUN | RL_CMD_AB | RL_CMD_PLAN, RL_TAKES_TEXT, AT(trace),
      .help = "write what ran when, for ui.perfetto.dev or\n"
-             "chrome://tracing"},
+             "chrome://tracing; plan --format html: such a file,\n"
+             "whose times the page shows"},
     {"quiet", NULL, EVERY, RL_TAKES_FLAG, AT(quiet),
      .help = "print errors and warnings only: no notes, no progress"},
     {"verbose", NULL, EVERY, RL_TAKES_FLAG, AT(verbose),

@@ -59,7 +59,12 @@ function trim() {
 async function decodeBlock(block) {
   const size = block.planes * block.width * block.height * block.bits / 8;
   const coded = await inflate(base64Bytes(byId("block-" + block.id).textContent), size);
-  return {...block, data: block.bits === 8 ? undo8(coded, block) : undo16(coded, block)};
+  const data = block.bits === 8 ? undo8(coded, block) : undo16(coded, block);
+  if (block.base !== undefined) { /* a difference to another block, which wraps around like that one's numbers */
+    const base = (await loadBlock({...block, id: block.base, base: undefined})).data;
+    for (let i = 0; i < data.length; i++) data[i] += base[i];
+  }
+  return {...block, data};
 }
 
 /* The numbers of a block: a promise of {data, planes, width, height, …}. */

@@ -134,7 +134,7 @@ class GraphView {
   describe(n) {
     for (const e of this.edges || []) if (e.element) e.element.classList.toggle("lit", n !== null && (e.from === n || e.to === n));
     if (!n) {
-      this.detail.replaceChildren(h("p", {class: "small"}, h("i", {class: "key varied"}), "not the same in all variants",
+      this.detail.replaceChildren(h("p", {class: "small"}, this.nodes.some(x => x.varied) ? [h("i", {class: "key varied"}), "not the same in all variants"] : null,
         this.total ? [h("i", {class: "key cost"}), "ms a frame on the device"] : null, h("i", {class: "key history"}), "the frame before"));
       return;
     }

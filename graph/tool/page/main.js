@@ -4,16 +4,9 @@ function openHelp() {
   const dialog = byId("help");
   if (!dialog.childElementCount)
     dialog.append(h("h2", {id: "help-title"}, "Keyboard"),
-      h("dl", {class: "keys"}, KEYS.map(([keys, what]) => [h("dt", {}, keys.split(/ (?=\S$)|(?<=^\S) /).map(k => h("kbd", {}, k))), h("dd", {}, what)])),
+      h("dl", {class: "keys"}, KEYS.map(([keys, what]) => [h("dt", {}, keys.map(k => h("kbd", {}, k))), h("dd", {}, what)])),
       h("form", {method: "dialog"}, h("button", {autofocus: true}, "Close")));
   dialog.showModal();
-}
-
-/* The system's choice until somebody chooses. */
-function switchTheme() {
-  const root = document.documentElement, dark = root.dataset.theme ? root.dataset.theme === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
-  root.dataset.theme = dark ? "light" : "dark";
-  byId("theme").setAttribute("aria-label", `Theme: ${root.dataset.theme}`);
 }
 
 function facts(metrics, page) {

@@ -89,3 +89,10 @@ function segmented(label, options, value, change) {
   group.set = set;
   return group;
 }
+
+/* The system's choice until somebody chooses. */
+function switchTheme() {
+  const root = document.documentElement, dark = root.dataset.theme ? root.dataset.theme === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
+  root.dataset.theme = dark ? "light" : "dark";
+  byId("theme").setAttribute("aria-label", `Theme: ${root.dataset.theme}`);
+}

@@ -319,6 +319,9 @@ class Viewer {
     this.tagB.classList.toggle("left", side || st.mode === "flip");
     this.tagB.style.left = side ? "calc(50% + 10px)" : "";
     this.stage.dataset.mode = st.mode;
+    const names = [`A, ${this.sourceName(st.a)}`, `B, ${this.sourceName(st.b)}`];
+    this.canvas.setAttribute("aria-label", `Frame ${this.frame.frame}, ` + (st.mode === "flip" ? names[st.flipped ? 1 : 0]
+      : `${names[0]}, left; ${names[1]}, right`) + "; space flips, ? lists all keys");
     this.message.hidden = !this.loaded.missing;
     if (this.loaded.missing) this.message.textContent = "No such map was measured for A and B.";
     this.showPixel(scene, css);

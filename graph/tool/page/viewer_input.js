@@ -1,23 +1,23 @@
 /* Hands on the viewer: pointer, wheel, two fingers, keyboard. */
 
 const KEYS = [
-  ["Space", "A and B in turns"],
-  ["W F S", "wipe, flip, side by side"],
-  ["\u2190 \u2192", "move the line (Shift: further); in flip and side by side: pan"],
-  ["\u2191 \u2193, Shift + arrows", "pan"],
-  ["+ \u2212", "zoom; wheel and two fingers too"],
-  ["0 1", "all of the picture; one pixel a pixel"],
-  ["[ ]", "exposure, a quarter of a stop"],
-  ["E", "exposure 0"],
-  ["H", "next heat map: FLIP, HDR-FLIP, difference, off"],
-  ["A B", "next variant as A, as B (Shift: the one before)"],
-  ["X", "swap A and B"],
-  [", .", "frame before, next frame"],
-  ["V", "next view"],
-  ["Alt + arrows", "move the pixel that is read out (Shift: by 10)"],
-  ["Esc", "let go of that pixel"],
-  ["T", "light or dark"],
-  ["?", "this list"]
+  [["Space"], "A and B in turns"],
+  [["W", "F", "S"], "wipe, flip, side by side"],
+  [["\u2190", "\u2192"], "move the line (Shift: further); in flip and side by side: pan"],
+  [["\u2191", "\u2193", "Shift + arrows"], "pan"],
+  [["+", "\u2212"], "zoom; two fingers too, and the wheel after a click on the picture"],
+  [["0", "1"], "all of the picture; one pixel a pixel"],
+  [["[", "]"], "exposure, a quarter of a stop"],
+  [["E"], "exposure 0"],
+  [["H"], "next heat map: FLIP, HDR-FLIP, difference, off"],
+  [["A", "B"], "next variant as A, as B (Shift: the one before)"],
+  [["X"], "swap A and B"],
+  [[",", "."], "frame before, next frame"],
+  [["V"], "next view"],
+  [["Alt + arrows"], "move the pixel that is read out (Shift: by 10)"],
+  [["Esc"], "let go of that pixel"],
+  [["T"], "light or dark"],
+  [["?"], "this list"]
 ];
 
 class ViewerInput {
