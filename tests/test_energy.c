@@ -216,10 +216,6 @@ static void check_against_sums(int taps, int border, double tolerance, double cl
     brute_force(&s, taps, expected);
     for (size_t id = 1; id <= 2; id++) {
         rl_energy_read(s.energy, id, &got);
-        print_message("taps %d border %d material %zu: %.2g off, open %.2g, imbalance %.2g; border %.3f off "
-                      "%.3f of in\n",
-                      taps, border, id, worst, rl_energy_open(&got), rl_energy_imbalance(&got),
-                      got.border[0] / got.in[0], got.off_screen[0] / got.in[0]);
         assert_true(differs(&got, &expected[id]) < tolerance);
         assert_true(rl_energy_open(&got) < closes);
         assert_true(got.border[0] > 0.01 * got.in[0]);
