@@ -11,7 +11,8 @@
  *     constant material_t *    one entry a dense stencil index  (generated: every registered pass's rows)
  *     constant light_t *       when .lights is set
  *     constant ambient_t *     when .ambient is set
- *     constant float *         when .tables is set: what the host computed
+ *     constant float *         when .tables is set: what the host computed (global const float * when it may
+ *                              be more than the 64 KiB that every device has as constant memory)
  */
 #ifndef RL_MODEL_PASS_H
 #define RL_MODEL_PASS_H
