@@ -152,16 +152,21 @@ static inline int pattern_count(int n)
     return fit > MOST_PATTERNS ? MOST_PATTERNS : (fit - 1) | 1;
 }
 
+static inline floatv weigh_channel(floatv exponent, floatv common)
+{
+    floatv e = weight_exp2(exponent);
+    return fma(e, e, (floatv)1.0f) * (e * common);
+}
+
 /* A tap's weights for the three channels, of the lanes in `counts`: `share` times R(sqrt(r2 + dz²)) without
  * its constant factors; lengths in units of the largest d. */
 static inline void weigh_tap(const group_t *g, floatv r2, floatv dz, floatv share, intv counts, floatv w[3])
 {
     floatv q = fma(dz, dz, r2), ir = rsqrt(q), r = q * ir;
     floatv common = scatter_keep(ir * share, counts);
-    for (int c = 0; c < 3; c++) {
-        floatv e = weight_exp2(r * g->fall[c]);
-        w[c] = fma(e, e, (floatv)1.0f) * (e * common);
-    }
+    w[0] = weigh_channel(r * g->fall[0], common); /* a loop is not unrolled, and goes through memory */
+    w[1] = weigh_channel(r * g->fall[1], common);
+    w[2] = weigh_channel(r * g->fall[2], common);
 }
 
 /* From weights w and weighted light c to what one channel sends out, a pixel's `own` light given. Weights add
@@ -175,6 +180,14 @@ static inline floatv settle(floatv own, floatv c, floatv w, float share)
     floatv v = fma((floatv)share, c / w - own, own);
     return rl_select(own, fmax(v, fmin(own, 0.0f)), w > MIN_WEIGHT);
 }
+
+#if P_weighting == WEIGHTING_SURFACE
+/* What a curved surface sends out beside a flat one: of the weights there and on the tangent plane. */
+static inline floatv curve(const group_t *g, floatv w, floatv planar)
+{
+    return rl_select((floatv)1.0f, fma(g->plane.cosine, w / planar - 1.0f, (floatv)1.0f), w > MIN_WEIGHT);
+}
+#endif
 
 /* What n taps say, whose patterns start at `taps`, of the pixels' own light in `out`; lanes without a sample
  * keep it. */
@@ -202,18 +215,17 @@ static inline void sum_taps(const inputs_t *in, const group_t *g, global const f
             fetch_tap(in, at[i + AHEAD]);
             intv id = rl_as_intv(rl_vload(0, in->stencil + a)), same = id == g->material;
             floatv other = rl_vload(0, in->depth + a), dz = scatter_keep((other - g->z) * g->inv_d, same);
+            floatv stands = weight[i], e[3];
 #if P_weighting == WEIGHTING_SURFACE
             int x = shift[i], y = shift[TAP_BLOCK + i];
-            floatv flat = g->plane.x * (float)x + g->plane.y * (float)y, p[3];
+            floatv flat = g->plane.x * (float)x + g->plane.y * (float)y, plane_dz = flat * g->inv_d, p[3];
             intv away = scatter_turned_away(in, &g->v, x, y, id, other, g->z + flat);
-            floatv plane_dz = flat * g->inv_d;
             dz = rl_select(plane_dz, dz, same);
             weigh_tap(g, g->scale2 * r2[i], plane_dz, weight[i], same | away | g->keep, p);
             p0 += p[0];
             p1 += p[1];
             p2 += p[2];
 #endif
-            floatv stands = weight[i], e[3];
             AREA(stands *= rl_select((floatv)1.0f, rl_vload(0, in->area + a) * per_own, same);)
             weigh_tap(g, g->scale2 * r2[i], dz, stands, same | g->keep, e);
             w0 += e[0];
@@ -228,9 +240,9 @@ static inline void sum_taps(const inputs_t *in, const group_t *g, global const f
     out[1] = settle(out[1], c1, w1, share[1]);
     out[2] = settle(out[2], c2, w2, share[2]);
 #if P_weighting == WEIGHTING_SURFACE
-    out[0] *= rl_select((floatv)1.0f, fma(g->plane.cosine, w0 / p0 - 1.0f, (floatv)1.0f), w0 > MIN_WEIGHT);
-    out[1] *= rl_select((floatv)1.0f, fma(g->plane.cosine, w1 / p1 - 1.0f, (floatv)1.0f), w1 > MIN_WEIGHT);
-    out[2] *= rl_select((floatv)1.0f, fma(g->plane.cosine, w2 / p2 - 1.0f, (floatv)1.0f), w2 > MIN_WEIGHT);
+    out[0] *= curve(g, w0, p0);
+    out[1] *= curve(g, w1, p1);
+    out[2] *= curve(g, w2, p2);
 #endif
 }
 
