@@ -93,6 +93,13 @@ static const rl_port ports[] = {
 
 static const rl_step steps[] = {{"lighting", .domain = RL_EVERY_VECTOR}};
 
+/* With three lights; how many there are is not known here. */
+static double cost(const void *p)
+{
+    (void)p;
+    return 26;
+}
+
 const rl_pass rl_pass_lighting = {
     .name = "lighting",
     .help = "direct and ambient light: diffuse transmission, specular reflection, translucency",
@@ -108,4 +115,5 @@ const rl_pass rl_pass_lighting = {
     .steps = RL_ARRAY(steps),
     .lights = true,
     .ambient = true,
+    .cost = cost,
 };

@@ -10,16 +10,21 @@ typedef struct rl_node_state {
     rl_memory *params, *tables; /* NULL when the pass has none */
 } rl_node_state;
 
+/* A scene on the device. */
+typedef struct rl_scene_state {
+    rl_scene scene;
+    rl_memory *materials, *frame, *lights, *ambient;
+} rl_scene_state;
+
 struct rl_executor {
     rl_arena arena;
     rl_device *device;
     const rl_plan *plan;
-    const rl_materials *material_table;
-    bool march; /* programs of passes with .lights know of SHADOW_MARCH */
     const rl_log *log;
     rl_node_state *nodes; /* [graph->n_nodes] */
     rl_program *convert;
-    rl_memory *materials, *frame, *lights, *ambient;
+    rl_scene_state *scenes; /* [n_scenes] */
+    size_t n_scenes;
     rl_geometry geometry; /* columns 0: no size yet */
     rl_memory **slots;    /* [plan->n_slots] */
     rl_memory **history;  /* [plan->n_buffers][2]; NULL where the buffer is not HISTORY */
@@ -27,5 +32,8 @@ struct rl_executor {
     bool has_history;
     camera_t previous;
 };
+
+/* executor_programs.c: builds the programs of all live nodes and of the conversions. */
+rl_code rl_executor_build(rl_executor *executor, int threads, rl_error *err);
 
 #endif
