@@ -220,9 +220,9 @@ static void measure(shape kind, double dense[3][3], double taps[3][3])
     sss_scene_free(&s);
 }
 
-/* `surface` beside `area`, the mean of the channels' errors. On the cylinder it takes too much from the
- * widest channel, of which a third goes round the edge. The ball has room around it: beyond the image nothing
- * tells that a surface has turned away. */
+/* `surface` beside `area`, the mean of the channels' errors. On the cylinder it is farther off in the widest
+ * channel. The ball has room around it: beyond the image nothing tells that a surface has turned away, and
+ * `surface` is no better than `area` at an image's edge. */
 static void surface_is_nearest(void **state)
 {
     (void)state;
