@@ -37,7 +37,8 @@ static inline void sum_lights(constant material_t *m, const surface_t *s, consta
                               global const float *shadow_thickness, int x, int y, floatv *diffuse, floatv *specular)
 {
     int at = rl_index(f, x, y);
-    int transmits = m->has_profile && m->shading_transmission && m->profile_transmission != OPAQUE;
+    int transmits = m->has_profile && m->shading_transmission && m->profile_transmission != OPAQUE &&
+                    m->profile_transmission != GATHER;
     int scattered = scatters(m);
     for (int i = 0; i < f->lights; i++) {
         constant light_t *light = &lights[i];
@@ -60,9 +61,11 @@ static inline void sum_lights(constant material_t *m, const surface_t *s, consta
         floatv lit = r.falloff * r.visibility * fmax(r.nl, 0.0f);
         floatv front = entered * r.visibility * fmax(r.nl, 0.0f);
         for (int c = 0; c < 3; c++) {
+            floatv e = front;
             if (scattered)
-                front = r.falloff * scatter_visibility(s, &r) * sg_irradiance(&s->sg[c], dot3(s->bent[c], r.l));
-            diffuse[c] += light->intensity[c] * front;
+                e = mix(front, r.falloff * scatter_visibility(s, &r) * sg_irradiance(&s->sg[c], dot3(s->bent[c], r.l)),
+                        s->blurred[c]);
+            diffuse[c] += light->intensity[c] * e;
         }
         if (transmits && rl_any(r.nl < 0.0f)) {
             floatv back = fmax(-r.nl, 0.0f), t[3];
@@ -111,12 +114,16 @@ static inline void shade(constant material_t *m, surface_t *s, constant params_t
     }
 }
 
-kernel void lighting(global const float *albedo, global const float *normal, global const float *depth,
-                     global const uint *stencil, global const float *thickness, global const float *shadow,
-                     global const float *shadow_thickness, global const float *roughness, global const float *specular,
-                     global const float *metallic, global const float *emission, global const float *curvature,
-                     global const float *smooth_normal, global float *diffuse, global float *lit, constant params_t *p, constant frame_t *f,
-                     constant material_t *materials, constant light_t *lights, constant ambient_t *ambient)
+#define LIGHTING_PORTS                                                                                       \
+    global const float *albedo, global const float *normal, global const float *depth,                       \
+        global const uint *stencil, global const float *thickness, global const float *shadow,               \
+        global const float *shadow_thickness, global const float *roughness,                                 \
+        global const float *specular, global const float *metallic, global const float *emission,            \
+        global const float *curvature, global const float *smooth_normal, global float *diffuse,             \
+        global float *lit, ENERGY_PORT constant params_t *p, constant frame_t *f,                            \
+        constant material_t *materials, constant light_t *lights, constant ambient_t *ambient
+
+kernel void lighting(LIGHTING_PORTS)
 {
     int x = RL_W * (int)get_global_id(0), y = (int)get_global_id(1), at = rl_index(f, x, y);
     uintv id = rl_load_id(stencil, at);
@@ -159,3 +166,22 @@ kernel void lighting(global const float *albedo, global const float *normal, glo
         rl_store(out_lit[c], lit, at + c * f->plane);
     }
 }
+
+#if WANTS_energy
+kernel void lighting_energy(LIGHTING_PORTS)
+{
+    band_t band = energy_band(energy, f);
+    ENERGY_EACH_VECTOR(f, band, x, y)
+    {
+        int at = rl_index(f, x, y);
+        floatv values[ENERGY_PIXELS];
+        energy_clear(values);
+        for (int c = 0; c < 3; c++) {
+            if (HAS_emission)
+                values[ENERGY_IN + c] = rl_load(emission, at + c * f->plane);
+            values[ENERGY_OUT + c] = RL_LOAD(diffuse, c, x, y) + rl_load(lit, at + c * f->plane);
+        }
+        energy_post_all(&band, f, x, y, rl_load_id(stencil, at), values);
+    }
+}
+#endif

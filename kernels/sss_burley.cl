@@ -31,8 +31,6 @@
 #define MOST_PATTERNS 15
 #define PATTERN_TAPS  4096
 
-enum { ROTATION_NONE = 0, ROTATION_WHITE = 1, ROTATION_IGN = 2, ROTATION_BLUE = 3 };
-
 #if P_weighting != WEIGHTING_PLAIN
 #define AREA(x) x
 #else
@@ -61,41 +59,9 @@ typedef struct group_t {
     intv keep; /* all bits: samples that are none count as black */
 } group_t;
 
-/* What tells the pattern of a phase in a frame from the others: its turn (x) and the offset of its radii (y),
- * as shares of 2³². A turn alone does not do: the radii would stay where they are, and a few turns of one
- * spiral leave rings.
- *
- * BLUE takes the points of R2 (Roberts 2018: multiples of 1/g and 1/g², g³ = g + 1), which fill the square
- * of turns and offsets evenly from any point on. Frames follow each other, phases are sixteen points apart;
- * the order of phases is the one of which 2x2 neighbours err least together.
- * IGN is interleaved gradient noise (Jimenez 2014), a frame 5.588238 pixels on, for the offsets transposed.
- *
- * RMS error against sss_reference on two captured heads, beside that of WHITE. One frame: the same, but of
- * the means of 4x4 pixels 0.74 to 0.83 (BLUE), 0.83 to 0.86 (IGN). The mean of 8 frames: 0.80 to 0.84 (BLUE),
- * 1.2 to 1.3 (IGN); of 16 frames: 0.78 (BLUE), 1.1 to 1.3 (IGN). */
-static inline uint2 pattern_choice(int rotation, int seed, int number, int px, int py)
-{
-    const uint order[16] = {2, 3, 12, 6, 14, 8, 4, 10, 1, 11, 0, 5, 15, 7, 13, 9};
-    uint x = px, y = py, k = (uint)number + 16 * order[4 * py + px];
-    uint2 choice;
-    if (rotation == ROTATION_NONE)
-        return (uint2)(0, 0x80000000u);
-    if (rotation == ROTATION_WHITE)
-        return (uint2)(rl_hash((uint)seed, (uint)number, 4 * y + x, 1),
-                       rl_hash((uint)seed, (uint)number, 4 * y + x, 2));
-    if (rotation == ROTATION_IGN) { /* fractions of 2³²: 0.06711056, 0.00583715, their sum times 5.588238 */
-        uint frame = (uint)number * 1750839832u;
-        choice = (uint2)(288237660u * x + 25070368u * y, 25070368u * x + 288237660u * y) + frame;
-        choice = 52u * choice + mul_hi(choice, (uint2)(4221604530u)); /* 52.9829189 */
-    } else {
-        choice = (uint2)(2447445414u, 3242174889u) * k;
-    }
-    return choice + (uint2)(rl_hash((uint)seed, 0, 0, 1), rl_hash((uint)seed, 0, 0, 2));
-}
-
 /* Taps first…first+n-1, n <= TAP_BLOCK: index of the vector, radius² in units of d, weight, and for
- * weighting: surface how many pixels away, x before y. There are RL_W more indices behind the last, for
- * looking ahead. */
+ * weighting: surface and for the ledger how many pixels away, x before y. There are RL_W more indices behind
+ * the last, for looking ahead. */
 static inline void place_taps(const inputs_t *in, const group_t *g, global const float *taps, int stride,
                               int first, int n, int *at, float *r2, float *weight, int *shift)
 {
@@ -114,7 +80,7 @@ static inline void place_taps(const inputs_t *in, const group_t *g, global const
 #endif
         intv dx = rl_as_intv(fma(u, (floatv)g->k[0], (floatv)magic)) - as_int(magic);
         intv dy = rl_as_intv(fma(v, (floatv)g->k[1], (floatv)magic)) - as_int(magic);
-#if P_weighting == WEIGHTING_SURFACE
+#if P_weighting == WEIGHTING_SURFACE || WANTS_energy
         rl_vstore(dx, 0, shift + i);
         rl_vstore(dy, 0, shift + TAP_BLOCK + i);
 #endif
@@ -194,7 +160,7 @@ static inline floatv curve(const group_t *g, floatv w, floatv planar)
 /* What n taps say, whose patterns start at `taps`, of the pixels' own light in `out`; lanes without a sample
  * keep it. */
 static inline void sum_taps(const inputs_t *in, const group_t *g, global const float *taps, int n,
-                            floatv out[3])
+                            floatv *out)
 {
     int stride = tap_stride(n), plane = in->f->plane4;
     taps += (3 * stride + 3) * (int)mul_hi(g->spread, (uint)pattern_count(n));
@@ -205,6 +171,10 @@ static inline void sum_taps(const inputs_t *in, const group_t *g, global const f
     int shift[2 * TAP_BLOCK];
 #if P_weighting == WEIGHTING_SURFACE
     floatv p0 = 0.0f, p1 = 0.0f, p2 = 0.0f;
+#endif
+#if WANTS_energy
+    rejected_t rejected = {{0.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 0.0f}};
+    const floatv own[3] = {out[0], out[1], out[2]};
 #endif
     AREA(floatv per_own = 1.0f / rl_vload(0, in->area + g->v.at);)
     for (int first = 0; first < n; first += TAP_BLOCK) {
@@ -236,8 +206,17 @@ static inline void sum_taps(const inputs_t *in, const group_t *g, global const f
             c0 = fma(e[0], scatter_keep(rl_vload(0, in->diffuse + a), same), c0);
             c1 = fma(e[1], scatter_keep(rl_vload(0, in->diffuse + plane + a), same), c1);
             c2 = fma(e[2], scatter_keep(rl_vload(0, in->diffuse + 2 * plane + a), same), c2);
+#if WANTS_energy
+            weigh_tap(g, g->scale2 * r2[i], dz, weight[i], ~same, e);
+            for (int c = 0; c < 3; c++)
+                scatter_reject(&rejected, c, e[c],
+                               scatter_inside(in->f, &g->v, shift[i], shift[TAP_BLOCK + i]));
+#endif
         }
     }
+#if WANTS_energy
+    const floatv w[3] = {w0, w1, w2}, light[3] = {c0, c1, c2};
+#endif
     out[0] = settle(out[0], c0, w0, share[0]);
     out[1] = settle(out[1], c1, w1, share[1]);
     out[2] = settle(out[2], c2, w2, share[2]);
@@ -245,6 +224,10 @@ static inline void sum_taps(const inputs_t *in, const group_t *g, global const f
     out[0] *= curve(g, w0, p0);
     out[1] *= curve(g, w1, p1);
     out[2] *= curve(g, w2, p2);
+#endif
+#if WANTS_energy
+    for (int c = 0; c < 3; c++)
+        scatter_account(out, c, own[c], w[c], light[c], &rejected, g->keep, out[c], out[c], MIN_WEIGHT);
 #endif
 }
 
@@ -285,9 +268,11 @@ static inline void lay_disk(const inputs_t *in, group_t *g, intv now)
 
 /* The lanes `now` of the group, with the pattern that their size on screen asks for. */
 static inline void filter_group(const inputs_t *in, const group_t *g, constant params_t *p,
-                                global const float *taps, intv now, floatv out[3])
+                                global const float *taps, intv now, floatv *out)
 {
-    floatv sum[3] = {out[0], out[1], out[2]};
+    floatv sum[SCATTER_OUT];
+    for (int c = 0; c < SCATTER_OUT; c++)
+        sum[c] = out[c];
     if (p->taps > 0) {
         sum_taps(in, g, taps, p->taps, sum);
     } else {
@@ -296,23 +281,25 @@ static inline void filter_group(const inputs_t *in, const group_t *g, constant p
         floatv some = beyond(rho, LOD_SOME), many = beyond(rho, LOD_MANY);
         if (!scatter_any(now & (some > 0.0f)))
             return;
-        floatv fine[3] = {out[0], out[1], out[2]};
+        floatv fine[SCATTER_OUT];
+        for (int c = 0; c < SCATTER_OUT; c++)
+            fine[c] = out[c];
         if (scatter_any(now & (many < 1.0f)))
             sum_taps(in, g, taps, TAPS_SOME, sum);
         if (scatter_any(now & (many > 0.0f)))
             sum_taps(in, g, taps + (3 * TAP_BLOCK + 3) * MOST_PATTERNS, TAPS_MANY, fine);
-        for (int c = 0; c < 3; c++) {
+        for (int c = 0; c < SCATTER_OUT; c++) {
             sum[c] = fma(many, fine[c] - sum[c], sum[c]);
             sum[c] = fma(some, sum[c] - out[c], out[c]);
         }
     }
-    for (int c = 0; c < 3; c++)
+    for (int c = 0; c < SCATTER_OUT; c++)
         out[c] = rl_select(out[c], sum[c], now);
 }
 
 static inline void filter_material(const inputs_t *in, const vector_t *v, constant params_t *p,
                                    global const float *tables, int material, constant material_t *mat,
-                                   intv mine, floatv out[3])
+                                   intv mine, floatv *out)
 {
     group_t g;
     int start = (int)tables[TABLE_PATTERNS + material];
@@ -357,9 +344,9 @@ kernel void sss_burley_filter(SCATTER_PORTS, global const float *tables)
     intv id = rl_as_intv(rl_vload(0, stencil + v.at)), left = id != 0;
     if (!scatter_any(left))
         return;
-    floatv out[3];
-    for (int c = 0; c < 3; c++)
-        out[c] = rl_vload(0, diffuse + c * f->plane4 + v.at);
+    floatv out[SCATTER_OUT];
+    for (int c = 0; c < SCATTER_OUT; c++)
+        out[c] = c < 3 ? rl_vload(0, diffuse + c * f->plane4 + v.at) : (floatv)0.0f;
     while (scatter_any(left)) {
         int m = scatter_max_int(id & left);
         intv mine = left & (id == m);
@@ -369,6 +356,9 @@ kernel void sss_burley_filter(SCATTER_PORTS, global const float *tables)
     }
     for (int c = 0; c < 3; c++)
         rl_vstore(out[c], 0, filtered + c * f->plane4 + v.at);
+#if WANTS_energy
+    SCATTER_KEEP_LEDGER(out, f->plane4, v.at)
+#endif
 }
 
 kernel void sss_burley_area(SCATTER_PORTS, global const float *tables)
@@ -380,3 +370,10 @@ kernel void sss_burley_resolve(SCATTER_PORTS, global const float *tables)
 {
     scatter_resolve(filtered, lit, albedo, normal, stencil, color, f, materials);
 }
+
+#if WANTS_energy
+kernel void sss_burley_energy(SCATTER_PORTS, global const float *tables)
+{
+    SCATTER_ENERGY(RL_PHASE4);
+}
+#endif

@@ -179,6 +179,7 @@ const rl_port rl_scatter_ports[RL_SCATTER_PORTS] = {
     {"area", RL_SCRATCH, RL_SCALAR, .help = "surface that a pixel sees", .layout = RL_PHASE4},
     {"filtered", RL_SCRATCH, RL_RGB, .help = "scattered radiance below the surface", .layout = RL_PHASE4},
     {"color", RL_WRITE, RL_RGB, .help = "radiance, scene-linear"},
+    RL_SCATTER_LEDGER(RL_PHASE4),
 };
 
 const rl_param rl_scatter_profile_rows[RL_SCATTER_PROFILE_ROWS] = {

@@ -12,6 +12,7 @@
 #include <stddef.h>
 
 #include "graph/model/pass.h"
+#include "passes/shading_rows.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -60,7 +61,7 @@ double rl_burley_scale(rl_burley_fit fit, double albedo);
 
 /* Ports of the passes that filter with a disk of pixels (kernels/scatter.cl), and the rows that they share:
  * identical rows in several passes are one field of the material table. */
-#define RL_SCATTER_PORTS        9
+#define RL_SCATTER_PORTS        14
 #define RL_SCATTER_PROFILE_ROWS 8
 #define RL_SCATTER_SHADING_ROWS 2
 extern const rl_port rl_scatter_ports[RL_SCATTER_PORTS];

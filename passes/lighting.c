@@ -33,8 +33,7 @@ static const rl_param profile_keys[] = {
     RL_ROW_SCATTER_DISTANCE(.required_with = "transmission=thin|thick"),
     RL_ROWS_SCATTER_PARAM,
     RL_ROW_TEXTURING,
-    M_ENUM(transmission, "none|thin|thick|beer_lambert", 0, "light that comes through from the back face",
-           .source = "Golubev 2018; Helix"),
+    RL_ROW_TRANSMISSION,
     M_ENUM(thickness_from, "max|layer|shadow", 0,
            "thick, beer_lambert: the thickness layer, shadow_thickness along the normal, or the larger",
            .source = "Golubev 2018"),
@@ -52,9 +51,7 @@ static const rl_param material_keys[] = {
       .no_default = true),
     M(RL_F32, specular, 0, 1, -1, "ratio",
       "reflectance at normal incidence; not given: the specular layer, else 0.04", .no_default = true),
-    M(RL_F32, metallic, 0, 1, -1, "ratio",
-      "1: albedo is the specular colour and nothing is diffuse; not given: the metallic layer, else 0",
-      .no_default = true),
+    RL_ROW_METALLIC,
     M(RL_F32, normal_detail_mm, 0, 1e4, 3, "mm",
       "diffuse: sg: size of the bumps that smooth_normal leaves out, as a standard deviation",
       .source = "d'Eon and Luebke 2007; MJP"),
@@ -63,7 +60,7 @@ static const rl_param material_keys[] = {
 static const rl_param shading_keys[] = {
     RL_ROW_DIFFUSE,
     M_ENUM(specular, "ggx|none", 0, "the specular lobe", .source = "Walter 2007, Heitz 2014"),
-    M(RL_BOOL, transmission, 0, 1, 1, "", "false switches off the transmission that profiles ask for"),
+    RL_ROW_TRANSMIT,
     RL_ROW_EXIT_TRANSMISSION,
 };
 
@@ -89,9 +86,13 @@ static const rl_port ports[] = {
      .optional = true},
     {"diffuse", RL_WRITE, RL_RGB, .help = "radiance that entered a subsurface material", .any_layout = true},
     {"lit", RL_WRITE, RL_RGB, .help = "all other radiance, complete"},
+    RL_PORT_ENERGY,
 };
 
-static const rl_step steps[] = {{"lighting", .domain = RL_EVERY_VECTOR}};
+static const rl_step steps[] = {
+    {"lighting", .domain = RL_EVERY_VECTOR},
+    {"lighting_energy", .domain = RL_EVERY_BAND, .with = "energy"},
+};
 
 /* With three lights; how many there are is not known here. */
 static double cost(const void *p)
@@ -100,12 +101,18 @@ static double cost(const void *p)
     return 26;
 }
 
+static bool stochastic(const void *values, bool march)
+{
+    const lighting_params *p = values;
+    return march && p->shadow_jitter;
+}
+
 const rl_pass rl_pass_lighting = {
     .name = "lighting",
     .help = "direct and ambient light: diffuse transmission, specular reflection, translucency",
     .source = "Golubev 2018; Helix; Walter 2007; Heitz 2014",
     .kernel = "lighting.cl",
-    .kernel_prelude = "sg.cl surface.cl sg_shade.cl screen_shadow.cl",
+    .kernel_prelude = "energy.cl sg.cl surface.cl sg_shade.cl screen_shadow.cl",
     .params = RL_ARRAY(params),
     .params_size = sizeof(lighting_params),
     .profile_keys = RL_ARRAY(profile_keys),
@@ -115,5 +122,6 @@ const rl_pass rl_pass_lighting = {
     .steps = RL_ARRAY(steps),
     .lights = true,
     .ambient = true,
+    .stochastic = stochastic,
     .cost = cost,
 };
