@@ -2,10 +2,9 @@
 #include "tests/sss_twin.h"
 
 #include <math.h>
-#include <string.h>
 
-#include "graph/base/alloc.h"
 #include "passes/burley.h"
+#include "tests/sss_patterns.h"
 
 static const double pi = 3.14159265358979323846;
 
@@ -305,50 +304,6 @@ static void choice_of(const twin_scene *s, int x, int y, int seed, double choice
     }
 }
 
-/* An odd number, at most 15, of patterns that are padded to 64 taps and have 4096 together. */
-static int patterns_of(int n)
-{
-    int most = 4096 / ((n + 63) / 64 * 64);
-    if (most > 15)
-        most = 15;
-    return most % 2 ? most : most - 1;
-}
-
-/* Weights of pattern j of n taps on a plane that faces the camera, beside the mean of all patterns. Those of
- * the last few materials are kept: there are many pixels. */
-static const double *shares_of(int n, const double d[3], int j)
-{
-    enum { KEPT = 8, MOST = 15 };
-    static struct {
-        int n;
-        double d[3], share[MOST][3];
-    } kept[KEPT], *k;
-    static int next;
-    for (int i = 0; i < KEPT; i++)
-        if (kept[i].n == n && !memcmp(kept[i].d, d, sizeof kept[i].d))
-            return kept[i].share[j];
-    k = &kept[next++ % KEPT];
-    memset(k, 0, sizeof *k);
-    k->n = n;
-    memcpy(k->d, d, sizeof k->d);
-    float *x = rl_malloc((size_t)n * 12), *y = x + n, *weight = y + n;
-    double mean[3] = {0}, unused[3];
-    int count = patterns_of(n);
-    for (int p = 0; p < count; p++) {
-        rl_burley_mixture_taps((size_t)n, (p + 0.5) / count, d, x, y, weight, unused);
-        for (int c = 0; c < 3; c++) {
-            for (int i = 0; i < n; i++)
-                k->share[p][c] += rl_burley_profile(hypot(x[i], y[i]), d[c]) * weight[i];
-            mean[c] += k->share[p][c] / count;
-        }
-    }
-    for (int p = 0; p < count; p++)
-        for (int c = 0; c < 3; c++)
-            k->share[p][c] /= mean[c];
-    rl_free(x);
-    return k->share[j];
-}
-
 void twin_burley(const twin_scene *s, int x, int y, int n, int seed, double filtered[3])
 {
     const camera_t *c = &s->frame.camera;
@@ -360,19 +315,19 @@ void twin_burley(const twin_scene *s, int x, int y, int n, int seed, double filt
     float less = slope2 > 0 ? (1.0f / sqrtf(1.0f + slope2) - 1.0f) / slope2 : 0;
     float xx = less * t[0] * t[0], xy = less * t[0] * t[1], yy = less * t[1] * t[1];
     float kx = c->focal[0] / (middle * inv_d), ky = c->focal[1] / (middle * inv_d);
-    double choice[2], offset;
+    double choice[2];
     choice_of(s, x, y, seed, choice);
-    int pattern = (int)floor(choice[1] * patterns_of(n));
-    offset = (pattern + 0.5) / patterns_of(n);
     float co = (float)cos(2 * pi * floor(choice[0] * 256) / 256),
           si = (float)sin(2 * pi * floor(choice[0] * 256) / 256);
     double z = s->depth[at(s, x, y)], scale = z / middle, own = twin_area(s, x, y), sum[3] = {0},
            weights[3] = {0}, planar[3] = {0};
     tangent_t tangent = tangent_of(s, x, y);
     double proportions[3] = {(double)d[0] / most, (double)d[1] / most, (double)d[2] / most};
-    const double *share = shares_of(n, proportions, pattern);
-    float *tx = rl_malloc((size_t)n * 12), *ty = tx + n, *tw = ty + n;
-    rl_burley_mixture_taps((size_t)n, offset, proportions, tx, ty, tw, (double[3]){0});
+    const patterns_t *patterns = patterns_for(n, proportions);
+    int pattern = (int)floor(choice[1] * patterns->count);
+    const float *tx = patterns->x + pattern * n, *ty = patterns->y + pattern * n,
+                *tw = patterns->weight + pattern * n;
+    const double *share = patterns->share[pattern];
     for (int i = 0; i < n; i++) {
         float u = fmaf(tx[i], co, -(ty[i] * si)), v = fmaf(tx[i], si, ty[i] * co);
         float x_disk = u;
@@ -405,5 +360,4 @@ void twin_burley(const twin_scene *s, int x, int y, int n, int seed, double filt
         }
         filtered[k] = v;
     }
-    rl_free(tx);
 }
