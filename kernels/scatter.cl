@@ -374,9 +374,9 @@ static inline void scatter_reject(rejected_t *r, int c, floatv weight, intv insi
     r->off_screen[c] += scatter_keep(weight, ~inside);
 }
 
-/* Channel c of a result: the pixel's own light, the share of the result that is not left to it, the weights w of the samples that count and their light times
- * weights, those that are rejected (`black`: they are in w), and what the filter gives, before its clamps and
- * after. */
+/* Channel c of a result: the pixel's own light, the share of the result that is not left to it, the weights w
+ * of the samples that count and their light times weights, those that are rejected (`black`: they are in w),
+ * and what the filter gives, before its clamps and after. */
 static inline void scatter_account(floatv *out, int c, floatv own, float share, floatv w, floatv light,
                                    const rejected_t *r, intv black, floatv unclamped, floatv given, float least)
 {
