@@ -121,7 +121,7 @@ $(BUILD)/kernels.o $(BUILD)/page.o: %.o: %.c
 $(BUILD)/graph/run/ingest.o: OPT += -O3
 
 # Sums over filter taps, the same; and powers of pixels, where errno and traps would keep sqrt and choices from it.
-$(BUILD)/graph/tool/metric_filter.o: OPT += -O3
+$(BUILD)/graph/tool/metric_filter.o $(BUILD)/graph/tool/metric_flip.o: OPT += -O3
 $(BUILD)/graph/tool/metric_flip_rows.o: OPT += -O3 -fno-math-errno -fno-trapping-math
 
 # Where `make install` puts things that are looked for at run time; a build tree finds its own first.

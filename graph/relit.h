@@ -66,6 +66,7 @@ typedef struct rl_options {
     int shard[2]; /* {I, N}: the I-th of N parts, from 1; N = 0: everything */
     int preroll;  /* frames of warm-up before a shard's first; 0 = history comes from the shard before it */
     int checkpoint_frames; /* a checkpoint of history every so many frames; 0 = by what one costs */
+    bool energy;           /* experiments keep the ledger of energy (graph/run/energy.h) */
     const char *ocio;      /* OpenColorIO config; NULL = the pipeline's, else $OCIO, else relit's own */
     const rl_log *log;
 } rl_options;

@@ -89,9 +89,13 @@ static const rl_port ports[] = {
      .optional = true},
     {"diffuse", RL_WRITE, RL_RGB, .help = "radiance that entered a subsurface material", .any_layout = true},
     {"lit", RL_WRITE, RL_RGB, .help = "all other radiance, complete"},
+    RL_PORT_ENERGY,
 };
 
-static const rl_step steps[] = {{"lighting", .domain = RL_EVERY_VECTOR}};
+static const rl_step steps[] = {
+    {"lighting", .domain = RL_EVERY_VECTOR},
+    {"lighting_energy", .domain = RL_EVERY_BAND, .with = "energy"},
+};
 
 /* With three lights; how many there are is not known here. */
 static double cost(const void *p)
@@ -111,7 +115,7 @@ const rl_pass rl_pass_lighting = {
     .help = "direct and ambient light: diffuse transmission, specular reflection, translucency",
     .source = "Golubev 2018; Helix; Walter 2007; Heitz 2014",
     .kernel = "lighting.cl",
-    .kernel_prelude = "sg.cl surface.cl sg_shade.cl screen_shadow.cl",
+    .kernel_prelude = "energy.cl sg.cl surface.cl sg_shade.cl screen_shadow.cl",
     .params = RL_ARRAY(params),
     .params_size = sizeof(lighting_params),
     .profile_keys = RL_ARRAY(profile_keys),

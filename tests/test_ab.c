@@ -340,6 +340,10 @@ static void test_wrong(void **state)
         {{"--vary", "graph.sss.taps=8,16", "--sheet=a.nothing"}, "'.nothing'"},
         {{"--vary", "graph.sss.taps=8,16", "--against", "/nowhere/at/all"}, "/nowhere/at/all"},
         {{"--vary", "graph.sss.taps=8,16", "--report-frames", "frist"}, "frist"},
+        {{"--vary", "graph.sss.taps=8,16", "--set", "outputs.preview.file=../{capture}.{frame}.png"},
+         "output 'preview': variants 'taps_8' and 'taps_16' would both write '"},
+        {{"--vary", "graph.sss.taps=8,16", "--set", "outputs.preview.file=/nowhere/{frame}.png"},
+         "would both write '/nowhere/1.png'; put {variant} into 'file'"},
         {{"/nowhere.yaml"}, "/nowhere.yaml: error: cannot be opened"},
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
@@ -470,7 +474,7 @@ static void test_default_folder(void **state)
     free(back);
     expect(&r, 0);
     expect_in(r.out, "\nout/ab/report.html\n");
-    assert_true(is_there("ab/metrics.json") && is_there("ab/4/s.0001.exr"));
+    assert_true(is_there("ab/metrics.json") && is_there("ab/taps_4/s.0001.exr"));
     tool_result_free(&r);
 }
 
@@ -489,10 +493,11 @@ static void test_plan(void **state)
     assert_int_equal(sscanf(cost, "2 variants = %lfx one (%lfx one after the other)", &factor, &one_by_one),
                      2);
     assert_true(factor > 1 && factor < one_by_one && one_by_one > 1.5 && one_by_one < 3);
-    expect_in(r.out, "  4   ");
+    expect_in(r.out, "  taps_4   ");
     expect_in(r.out, "light             lighting    all\n");
-    expect_in(r.out, "sss@2             sss_burley  21\n");
-    expect_in(r.out, "output.preview@2  color       21\n"); /* shown, and compared: still one variant's */
+    expect_in(r.out, "sss@2             sss_burley  taps_21\n");
+    expect_in(r.out,
+              "output.preview@2  color       taps_21\n"); /* shown, and compared: still one variant's */
     tool_result_free(&r);
     r = PLAN("--format", "json");
     expect(&r, 0);
@@ -516,7 +521,7 @@ static void test_plan_drawn(void **state)
     (void)state;
     tool_result r = PLAN("--format", "dot");
     expect(&r, 0);
-    expect_in(r.out, "label=\"2. sss\\nsss_burley\\n4\"");
+    expect_in(r.out, "label=\"2. sss\\nsss_burley\\ntaps_4\"");
     expect_in(r.out, "fillcolor");
     assert_null(strstr(r.out, "lighting\\n")); /* shared: not marked */
     tool_result_free(&r);

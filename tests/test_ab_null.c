@@ -9,6 +9,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "graph/base/alloc.h"
 #include "tests/fake_experiment.h"
 
 static rl_experiment *e;
@@ -136,6 +137,38 @@ static void test_rising_metrics(void **state)
     rl_ab_measure_free(&m);
 }
 
+/* A frame that fails half way leaves no trace in the bounds. */
+static void test_failed_frame(void **state)
+{
+    (void)state;
+    fake_plan_make(&p, 4, 2);
+    rl_ab_measure *m = measure_new();
+    draw(0, 1);
+    rl_ab_results r = measure(m);
+    rl_ab_null before = *rl_ab_null_of(&r, 0, FAKE_SKIN, RL_METRIC_FLIP);
+    size_t n_values = r.n_values;
+    int failures = 0;
+    draw(1, 50);
+    fake_frame_noise(e, 3, 99, 0.3f);
+    for (unsigned long n = 1, done = 0; !done; n++) {
+        rl_error err = {0};
+        rl_alloc_fail_at(n, 0);
+        rl_code code = rl_ab_measure_frame(m, &e->frame, &err);
+        done = rl_alloc_fail_at(0, 0) > 0;
+        assert_int_equal(code, done ? RL_OK : RL_E_MEMORY);
+        rl_ab_measure_results(m, &r, &err);
+        const rl_ab_null *null = rl_ab_null_of(&r, 0, FAKE_SKIN, RL_METRIC_FLIP);
+        if (done)
+            assert_true(null->n == 2 * before.n && null->bounds[0] > before.bounds[0]);
+        else
+            assert_memory_equal(null, &before, sizeof before);
+        assert_int_equal(r.n_values, done ? 2 * n_values : n_values);
+        failures += !done;
+    }
+    assert_true(failures > 20);
+    rl_ab_measure_free(&m);
+}
+
 static int marked(const rl_ab_results *r, int material, rl_metric metric)
 {
     for (size_t i = 0; i < r->n_values; i++)
@@ -207,6 +240,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_bounds, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_rising_metrics, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(test_failed_frame, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_marks, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_false_positives, set_up, tear_down),
     };

@@ -21,6 +21,7 @@ static const char first[] =
     "outputs: {beauty: {image: aa.color, file: \"{frame}.exr\"}}\n";
 static const char second[] = "relit: 1\n"
                              "include: [common.yaml]\n"
+                             "shading: {specular: none}\n"
                              "lights: {key: {type: point, position: [0, 0, 1], intensity: [1, 1, 1]}}\n"
                              "graph:\n"
                              "  light: {pass: lighting}\n"
@@ -165,19 +166,20 @@ static void test_pipelines(void **state)
     assert_string_equal(plan.variants[0].name, "a");
     assert_string_equal(plan.variants[1].name, "b");
     PAIRS({0, 1});
-    assert_int_equal(plan.n_parameters, 5);
+    assert_int_equal(plan.n_parameters, 6);
     PARAMETER(0, "graph.sss.pass", "sss_burley", "combine");
     PARAMETER(1, "graph.sss.taps", "21", NULL);
     PARAMETER(2, "graph.aa.pass", "taa", NULL);
     PARAMETER(3, "graph.aa.in.color", "sss.color", NULL);
     PARAMETER(4, "outputs.beauty.image", "aa.color", "sss.color");
+    PARAMETER(5, "shading.specular", NULL, "none");
     /* With a value that both have: each of both. --set is for all, and is no difference. */
     command c = {
         2, {"profiles.skin.texturing=post,pre_post"}, {{"materials.skin.roughness", "0.3"}}, .seeds = 1};
     config_assert_fine(make(c));
     assert_int_equal(plan.n_listed, 4);
     assert_string_equal(plan.variants[3].name, "b_pre_post");
-    assert_int_equal(plan.n_parameters, 6);
+    assert_int_equal(plan.n_parameters, 7);
     PARAMETER(0, "profiles.skin.texturing", "post", "pre_post", "post", "pre_post");
     /* A value of one's own that the other pipeline does not know. */
     assert_int_equal(make((command){.pipelines = 2, .vary = {"graph.aa.blend=0.1,0.2"}, .seeds = 1}),
@@ -233,7 +235,7 @@ static void test_seeds(void **state)
     }
     assert_string_not_equal(seed_of(2, "graph.sss.seed"), seed_of(3, "graph.sss.seed"));
     assert_string_not_equal(seed_of(2, "graph.sss.seed"), "0"); /* the first one's own */
-    assert_string_equal(plan.variants[2].name, "8.seed2");
+    assert_string_equal(plan.variants[2].name, "taps_8.seed2");
     c.seeds = 1;
     config_assert_fine(make(c));
     assert_int_equal(plan.n_variants, 2);

@@ -39,7 +39,7 @@ static void test_pow(void **state)
 }
 
 /* More than two tiles each way, not a whole number of them. */
-enum { W = 290, H = 150, N = W * H, TESTS = 4 };
+enum { W = 290, H = 150, N = W * H, TESTS = 5 };
 static float planes[1 + TESTS][3][N], maps[TESTS][N], one[N];
 
 static rl_metric_image view(int k, bool encoded)
@@ -62,6 +62,7 @@ static void draw(void)
                 planes[k][c][i] = (float)(0.5 + 0.3 * sin(i % W * 0.11 + c) * cos(i / W * 0.07));
     planes[2][1][64 * W + 128] += 0.3f;
     planes[3][0][N - 1] = 0;
+    planes[5][1][63 * W + 127] += 0.3f;
     for (int i = 0; i < N; i++)
         planes[4][2][i] += (float)(i % 7) * 0.01f;
 }
@@ -91,6 +92,7 @@ static void check(rl_metric metric, rl_pool *pool)
     }
     assert_true(maps[1][64 * W + 128] > 0.01f);
     assert_true(maps[1][63 * W + 127] > 0.01f && maps[1][64 * W + 127] > 0.01f);
+    assert_true(maps[4][64 * W + 128] > 0.01f && maps[4][63 * W + 128] > 0.01f);
     assert_true(maps[2][N - 1] > 0.01f);
     assert_true(maps[3][5] > 0);
 }

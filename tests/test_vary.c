@@ -140,10 +140,13 @@ static void test_names(void **state)
     names_of("p.texturing=post,pre_post", (const char *const[]){"post", "pre_post"});
     names_of("g.separable=true,false,null",
              (const char *const[]){"separable_true", "separable_false", "separable_null"});
-    names_of("p.d=[3,1.2,.7],[6, 5, 3]", (const char *const[]){"3_1.2_0.7", "6_5_3"});
+    names_of("p.d=[3,1.2,.7],[6, 5, 3]", (const char *const[]){"d_3_1.2_0.7", "d_6_5_3"});
     names_of("g.file=kernels/a.cl,'../b c.cl',' ',\"/\"",
-             (const char *const[]){"kernels_a.cl", "v.._b_c.cl", "value3", "value4"});
-    names_of("g.x=-1,.5,A,a", (const char *const[]){"v-1", "0.5", "A", "a_2"});
+             (const char *const[]){"kernels_a.cl", "file_.._b_c.cl", "value3", "value4"});
+    names_of("g.x=-1,.5,A,a", (const char *const[]){"x_-1", "x_0.5", "A", "a_2"});
+    names_of("graph.sss.taps=8,auto", (const char *const[]){"taps_8", "auto"});
+    names_of("p.gaussians.0.weight=1,2", (const char *const[]){"weight_1", "weight_2"});
+    names_of("p.d_mm.0=1,2", (const char *const[]){"d_mm.0_1", "d_mm.0_2"});
     names_of("g.x=report.html,\"\xc3\xa4\"", (const char *const[]){"report.html_2", "\xc3\xa4"});
     names_of("g.x=abcdefghijklmnopqrstuvwxyz01234\xc3\xa4,abcdefghijklmnopqrstuvwxyz0123456789,"
              "abcdefghijklmnopqrstuvwxyz0123456789a",
@@ -156,7 +159,7 @@ static void test_names(void **state)
     expect_names(&g, (const char *const[]){"skin"});
     const rl_vary varies[] = {vary("a=1,2"), vary("b=3")}; /* what all have is in no name */
     g = grid_of(one_file, 1, varies, 2);
-    expect_names(&g, (const char *const[]){"1", "2"});
+    expect_names(&g, (const char *const[]){"a_1", "a_2"});
 }
 
 /* Whatever the values: a name that a folder may have, and another one for each. */

@@ -43,8 +43,8 @@ size_t rl_grid_choice(const rl_grid *grid, size_t variant, size_t axis);
 bool rl_grid_before(const rl_grid *grid, size_t variant, size_t axis, size_t *out);
 
 /* Names for all variants, names[grid->n] in the arena: the pipeline's stem when there are several, then the
- * varied values, "post_21"; "separable_true" where a value alone says nothing. Letters, digits, '.', '-', '_'
- * and bytes of UTF-8, no '.' first, unique also where case does not count, none of `taken`. */
+ * varied values, "post_21"; "separable_true" and "taps_21" where a value alone says nothing. Letters, digits,
+ * '.', '-', '_' and bytes of UTF-8, no '.' first, unique also where case does not count, none of `taken`. */
 rl_code rl_grid_names(rl_arena *arena, const rl_grid *grid, const char *const *taken, size_t n_taken,
                       const char *const **names, rl_error *err);
 

@@ -9,9 +9,14 @@
 
 enum { LONGEST_PART = 32, LONGEST_NAME = 120 };
 
+static bool is_letter(unsigned char c)
+{
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c >= 0x80;
+}
+
 static bool is_letter_or_digit(unsigned char c)
 {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c >= 0x80;
+    return is_letter(c) || (c >= '0' && c <= '9');
 }
 
 /* The text with '_' for every run of bytes that a file name should not have; none at its ends. */
@@ -33,28 +38,38 @@ static void add_slug(rl_str *s, const char *text)
         s->text[--s->length] = 0;
 }
 
-static bool says_nothing(const rl_value *v)
+/* Where the name of what is varied begins: "taps", "scatter_distance_mm.0". */
+static const char *key_of(const char *path)
 {
-    return v->kind == RL_NULL || v->kind == RL_TRUTH;
+    const char *from = path + strlen(path);
+    while (from > path) {
+        do
+            from--;
+        while (from > path && from[-1] != '.');
+        if (!(*from >= '0' && *from <= '9'))
+            return from;
+        from -= from > path; /* an index of a list */
+    }
+    return path;
 }
 
-static const char *last_part(const char *path)
-{
-    const char *dot = strrchr(path, '.');
-    return dot ? dot + 1 : path;
-}
-
-static void add_value(rl_str *s, const rl_vary *vary, size_t choice)
+/* true, null, and what would begin a name with a digit or a sign: "taps_21" says more than "21", and "-1"
+ * would be an option to other programs. */
+static void add_value(rl_str *s, const rl_vary *vary, size_t choice, bool begins)
 {
     const rl_value *v = vary->values[choice];
-    size_t from = s->length;
-    if (says_nothing(v)) {
-        add_slug(s, last_part(vary->path));
+    rl_str value = {0};
+    add_slug(&value, v->kind == RL_TEXT ? v->text : vary->texts[choice]);
+    if (!value.length) /* a text of blanks, or '+' */
+        rl_str_printf(&value, "value%zu", choice + 1);
+    const char *text = rl_str_text(&value);
+    if (v->kind == RL_NULL || v->kind == RL_TRUTH || (begins && !is_letter((unsigned char)text[0]))) {
+        add_slug(s, key_of(vary->path));
         rl_str_add(s, "_");
     }
-    add_slug(s, v->kind == RL_TEXT ? v->text : vary->texts[choice]);
-    if (s->length == from) /* a text of blanks, or '+' */
-        rl_str_printf(s, "value%zu", choice + 1);
+    rl_str_add(s, text);
+    s->failed |= value.failed;
+    rl_str_free(&value);
 }
 
 static void add_pipeline(rl_str *s, const char *file)
@@ -79,9 +94,10 @@ static void add_name(rl_str *s, const rl_grid *grid, size_t variant)
     for (size_t i = 0; i < grid->n_varies; i++) {
         if (grid->varies[i].n < 2 && grid->n > 1)
             continue; /* the same in all */
-        if (s->length)
+        bool begins = !s->length;
+        if (!begins)
             rl_str_add(s, "_");
-        add_value(s, &grid->varies[i], rl_grid_choice(grid, variant, i + 1));
+        add_value(s, &grid->varies[i], rl_grid_choice(grid, variant, i + 1), begins);
         any = true;
     }
     if (!any)
@@ -116,7 +132,7 @@ rl_code rl_grid_names(rl_arena *arena, const rl_grid *grid, const char *const *t
         rl_str s = {0};
         add_name(&s, grid, i);
         const char *plain = rl_str_text(&s);
-        /* ".5" would be hidden, "-1" an option */
+        /* a file like ".yaml" */
         const char *lead = is_letter_or_digit((unsigned char)plain[0]) ? "" : "v";
         out[i] = s.failed ? NULL : rl_arena_printf(arena, "%s%s", lead, plain);
         for (int k = 2; out[i] && is_taken(out[i], out, i, taken, n_taken); k++)

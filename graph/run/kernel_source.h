@@ -15,7 +15,8 @@ extern "C" {
 const char *rl_kernel_file(rl_arena *arena, const char *name);
 
 /* `march`: a light asks for SHADOW_MARCH (LIGHTS_MARCH in programs of passes with .lights).
- * HAS_x, LAYOUT_x, P_x, params_t, material_t, then the sources, each behind a #line with its name. */
+ * HAS_x, WANTS_x, LAYOUT_x, P_x, params_t, material_t, then the sources, each behind a #line with its name.
+ */
 rl_code rl_kernel_text(rl_arena *arena, const rl_plan *plan, const rl_plan_node *node, bool march,
                        rl_str *out, rl_error *err);
 

@@ -2,6 +2,8 @@
 
 #include <math.h>
 
+#include "graph/tool/ab_energy.h"
+
 enum { SHOWN = 5 }; /* offenders of a threshold that are printed */
 
 /* ---- what is over -------------------------------------------------------------------------------------- */
@@ -52,8 +54,11 @@ rl_code rl_ab_fail_check(rl_arena *arena, const rl_ab_report *report, const rl_t
         *t = thresholds[i];
         if (t->metric == RL_THRESHOLD_SHOWN)
             t->metric = RL_METRIC_FLIP;
-        if (t->metric == RL_THRESHOLD_ENERGY)
+        if (t->metric == RL_THRESHOLD_ENERGY) {
+            if (rl_ab_energy_check(arena, report, &verdicts[i], err))
+                return err->code;
             continue;
+        }
         if (check_one(arena, report->results, &verdicts[i], err))
             return err->code;
         if (!verdicts[i].n_checked)

@@ -24,7 +24,7 @@ typedef struct rl_ab_verdict {
 } rl_ab_verdict;
 
 /* Checks every pair, frame and material, the whole too. Verdicts in the order of the thresholds, in the
- * arena; those of RL_THRESHOLD_ENERGY are left empty for whoever has a ledger. Statistics that do not exist
+ * arena. Statistics that do not exist
  * (of no pixels) are not checked; a threshold of which not one exists is RL_E_DATA: a limit that nothing is
  * held against must not pass. */
 rl_code rl_ab_fail_check(rl_arena *arena, const rl_ab_report *report, const rl_threshold *thresholds,

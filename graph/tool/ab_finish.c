@@ -133,6 +133,7 @@ rl_code rl_ab_finish(rl_ab_run *r, double seconds, size_t *over, rl_error *err)
                               .plan = &r->plan,
                               .experiment = r->experiment,
                               .results = &f.results,
+                              .energy = &r->energy,
                               .failures = r->failures,
                               .n_failures = r->n_failures,
                               .frames = r->frames,

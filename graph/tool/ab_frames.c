@@ -2,6 +2,7 @@
 #include <string.h>
 
 #include "graph/base/alloc.h"
+#include "graph/tool/ab_energy.h"
 #include "graph/tool/ab_run.h"
 #include "graph/tool/signals.h"
 
@@ -58,6 +59,8 @@ static rl_code compare(rl_ab_run *r, const rl_experiment_frame *f, rl_error *err
         code = rl_ab_page_measured(r->page, f, r->measure, rl_ab_measure_reference(r->measure), err);
     if (!code && r->sheet)
         code = rl_ab_sheet_frame(r->sheet, f, err);
+    if (!code)
+        code = rl_ab_energy_add(&r->energy, &r->plan, f, err);
     r->frames += !code;
     return code;
 }

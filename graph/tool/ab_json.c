@@ -9,6 +9,7 @@
 
 #include "graph/base/alloc.h"
 #include "graph/run/session.h"
+#include "graph/tool/ab_energy.h"
 #include "graph/tool/ab_fail.h"
 #include "graph/tool/ab_json_parts.h"
 
@@ -252,6 +253,7 @@ rl_code rl_ab_json(const rl_ab_report *r, rl_str *out, rl_error *err)
     pairs_json(r, out);
     captures_json(r, out);
     metrics_json(r, out);
+    rl_ab_energy_json(r, out);
     rl_ab_json_graph(r, out);
     rl_ab_json_cost(r, out);
     failures_json(r, out);

@@ -24,10 +24,11 @@ static rl_code fit_buffers(rl_ab_measure *m, size_t n, rl_error *err)
         return RL_OK;
     rl_ab_measure_empty(m);
     m->display = rl_calloc(n, 3 * plan->n_variants * sizeof *m->display);
+    m->rounded = rl_calloc(plan->against ? n : 0, 3 * m->most_tests * sizeof *m->rounded);
     m->maps = rl_calloc(n, plan->n_pairs * RL_METRICS * sizeof *m->maps);
     m->scratch = rl_calloc(n, m->most_replicates * sizeof *m->scratch);
     m->pixels.order = rl_calloc(n, sizeof *m->pixels.order);
-    if (!m->display || !m->maps || !m->scratch || !m->pixels.order) {
+    if (!m->display || !m->rounded || !m->maps || !m->scratch || !m->pixels.order) {
         rl_ab_measure_empty(m);
         return rl_fail_memory(
             err,
@@ -101,6 +102,18 @@ static void add_null(rl_ab_measure *m, size_t capture, rl_metric metric, const r
         rl_ab_null_add(&nulls[i * RL_METRICS], &sums[i]);
 }
 
+static rl_metric_image view_of_test(const rl_ab_measure *m, const rl_experiment_frame *frame,
+                                    const rl_ab_group *group, size_t i, rl_compared which)
+{
+    size_t n = (size_t)frame->width * (size_t)frame->height;
+    const float *planes = m->rounded + i * 3 * n;
+    const rl_compared_image rounded = {
+        frame->width, frame->height, {planes, planes + n, planes + 2 * n}, (size_t)frame->width};
+    return group->reference == RL_AB_AGAINST && which == RL_COMPARED_DISPLAY
+               ? rl_ab_view(&rounded, true)
+               : rl_ab_measure_view(m, frame, group->tests[i].variant, which);
+}
+
 /* Maps and statistics of one metric. */
 static rl_code measure_metric(rl_ab_measure *m, const rl_experiment_frame *frame, const rl_ab_group *group,
                               const rl_metric_image *reference, rl_metric metric, rl_error *err)
@@ -116,7 +129,7 @@ static rl_code measure_metric(rl_ab_measure *m, const rl_experiment_frame *frame
     }
     for (size_t i = 0; i < group->n_tests; i++) {
         const rl_ab_test *test = &group->tests[i];
-        views[i] = rl_ab_measure_view(m, frame, test->variant, compared_of(metric));
+        views[i] = view_of_test(m, frame, group, i, compared_of(metric));
         maps[i] = test->pair < 0 ? m->scratch + replicates++ * m->room
                                  : m->maps + ((size_t)test->pair * RL_METRICS + metric) * m->room;
     }
@@ -155,18 +168,24 @@ static rl_code measure_images(rl_ab_measure *m, const rl_experiment_frame *frame
     return RL_OK;
 }
 
-/* Tests that are compared with the same files go together. */
+/* Tests that are compared with the same files go together. The images for the display are rounded as the file
+ * is: what a run wrote is then equal to itself. */
 static rl_code measure_against(rl_ab_measure *m, const rl_experiment_frame *frame, const rl_ab_group *group,
                                rl_error *err)
 {
+    size_t pixels = 3 * (size_t)frame->width * (size_t)frame->height;
     for (size_t i = 0, n; i < group->n_tests; i += n) {
+        int levels;
         bool same = true;
         int variant = group->tests[i].variant;
         for (n = 1; i + n < group->n_tests && same; n += same)
             if (rl_ab_against_same(m->against, frame, variant, group->tests[i + n].variant, &same, err))
                 return err->code;
-        if (rl_ab_against_read(m->against, frame, variant, m->files, err))
+        if (rl_ab_against_read(m->against, frame, variant, m->files, &levels, err))
             return err->code;
+        for (size_t k = 0; k < n && m->files[RL_COMPARED_DISPLAY].plane[0]; k++)
+            rl_ab_round(m->display + (size_t)group->tests[i + k].variant * pixels, pixels, levels,
+                        m->rounded + k * pixels);
         rl_ab_group part = {RL_AB_AGAINST, group->tests + i, n};
         const rl_metric_image views[RL_COMPARED] = {rl_ab_view(&m->files[RL_COMPARED_LINEAR], false),
                                                     rl_ab_view(&m->files[RL_COMPARED_DISPLAY], true)};

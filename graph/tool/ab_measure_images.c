@@ -71,6 +71,13 @@ rl_code rl_ab_measure_check(const rl_ab_measure *m, const rl_experiment_frame *f
     return code ? code : check_image(m, frame, variant, RL_COMPARED_DISPLAY, err);
 }
 
+void rl_ab_round(const float *in, size_t n, int levels, float *out)
+{
+    float most = (float)levels;
+    for (size_t i = 0; i < n; i++)
+        out[i] = floorf(in[i] * most + 0.5f) / most;
+}
+
 rl_metric_image rl_ab_view(const rl_compared_image *image, bool encoded)
 {
     return (rl_metric_image){.width = image->width,

@@ -115,10 +115,11 @@ done:
 void rl_ab_measure_empty(rl_ab_measure *m)
 {
     rl_free(m->display);
+    rl_free(m->rounded);
     rl_free(m->maps);
     rl_free(m->scratch);
     rl_free(m->pixels.order);
-    m->display = m->maps = m->scratch = NULL;
+    m->display = m->rounded = m->maps = m->scratch = NULL;
     m->pixels.order = NULL;
     m->room = 0;
 }

@@ -50,6 +50,7 @@ struct rl_ab_measure {
     /* the frame */
     size_t room;      /* pixels that the buffers hold */
     float *display;   /* [variants][3] planes, clamped */
+    float *rounded;   /* [most_tests][3] planes, as a file of integers would hold them; for --against */
     float *maps;      /* [n_pairs][RL_METRICS] */
     float *scratch;   /* [most_replicates] */
     bool *measured;   /* [n_pairs][RL_METRICS] */
@@ -72,6 +73,8 @@ rl_code rl_ab_measure_check(const rl_ab_measure *m, const rl_experiment_frame *f
 /* ab_measure_new.c: frees the buffers of the frame. */
 void rl_ab_measure_empty(rl_ab_measure *m);
 
+/* n values to the nearest of 0 … levels, as fractions of it. */
+void rl_ab_round(const float *in, size_t n, int levels, float *out);
 /* An image of a checked variant, as metrics take it. */
 rl_metric_image rl_ab_measure_view(const rl_ab_measure *m, const rl_experiment_frame *frame, int variant,
                                    rl_compared which);
@@ -89,8 +92,9 @@ void rl_ab_against_free(rl_ab_against **against);
 rl_code rl_ab_against_same(rl_ab_against *against, const rl_experiment_frame *frame, int a, int b, bool *same,
                            rl_error *err);
 /* The reference of a variant at a frame: plane[0] of an image that the files do not give is NULL. Valid until
- * the next call. RL_E_IO: no file; RL_E_DATA: another size or data window, NaN; RL_E_FORMAT. */
+ * the next call. The display's is rounded to `levels` by rl_ab_round. RL_E_IO: no file; RL_E_DATA: another
+ * size or data window, NaN; RL_E_FORMAT. */
 rl_code rl_ab_against_read(rl_ab_against *against, const rl_experiment_frame *frame, int variant,
-                           rl_compared_image out[RL_COMPARED], rl_error *err);
+                           rl_compared_image out[RL_COMPARED], int *levels, rl_error *err);
 
 #endif

@@ -22,6 +22,7 @@ typedef struct rl_ab_report {
     const rl_ab_plan *plan;
     const rl_experiment *experiment;
     const rl_ab_results *results;
+    const rl_energy_ledger *energy; /* NULL: not kept */
     const struct rl_ab_verdict *verdicts;
     size_t n_verdicts;
     const rl_ab_failure *failures;

@@ -22,6 +22,7 @@ typedef struct rl_ab_run {
     rl_ab_sheet *sheet; /* NULL without --sheet */
     const char *sheet_path;
     rl_trace *trace; /* NULL without --trace */
+    rl_energy_ledger energy;
     rl_ab_failure *failures;
     size_t n_failures, room_failures;
     size_t frames; /* that were compared */

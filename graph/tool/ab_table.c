@@ -183,7 +183,9 @@ static bool add_table(const place *p, rl_str *out)
 static void add_legend(const rl_ab_report *r, bool any, rl_str *out)
 {
     size_t replicates = r->plan->n_variants - r->plan->n_listed;
-    rl_str_add(out, "Mean over the frames, then the worst frame. Pixels without material are left out.\n");
+    rl_str_add(out,
+               "Mean over the frames, then the worst frame. Pixels without material are left out. FLIP and "
+               "SSIM look\naround a pixel: what is beside a material shows in its numbers.\n");
     if (!r->results->n_nulls)
         return;
     if (any)

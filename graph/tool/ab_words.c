@@ -17,12 +17,12 @@ enum { LISTED = 3 /* names in a list, before "and N more" */ };
 
 /* ---- looking ------------------------------------------------------------------------------------------- */
 
-/* SSIM rounds: equal images may have 1 − 10⁻¹⁶. The others are 0 for equal pixels and for no others. */
-static bool differs(const rl_ab_value *v)
+/* Do pixels differ? FLIP and SSIM cannot tell: they look around a pixel, and so at what is beside a material.
+ * max is of the linear images, psnr of those for the display: one of them is there. */
+static bool pixels_differ(const rl_ab_value *v)
 {
-    if (v->metric == RL_METRIC_PSNR)
-        return isfinite(v->stats[RL_STAT_MEAN]);
-    return v->metric != RL_METRIC_SSIM && v->stats[RL_STAT_MAX] > 0;
+    return (v->metric == RL_METRIC_PSNR && isfinite(v->stats[RL_STAT_MEAN])) ||
+           (v->metric == RL_METRIC_MAX && v->stats[RL_STAT_MAX] > 0);
 }
 
 static bool is_worse(const rl_ab_value *v, const rl_ab_value *than)
@@ -41,7 +41,7 @@ static const rl_ab_value *find_worst(const rl_ab_results *r, size_t pair, rl_met
     const rl_ab_value *worst = NULL, *whole = NULL;
     for (size_t i = 0; i < r->n_values; i++) {
         const rl_ab_value *v = &r->values[i];
-        if (v->pair != pair || v->metric != metric || !differs(v))
+        if (v->pair != pair || v->metric != metric || !(v->stats[RL_STAT_MAX] > 0))
             continue;
         if (v->material == RL_AB_WHOLE)
             whole = is_worse(v, whole) ? v : whole;
@@ -57,9 +57,12 @@ static seen look_at(const rl_ab_results *r, size_t pair)
 {
     static const rl_metric order[] = {RL_METRIC_FLIP, RL_METRIC_HDRFLIP, RL_METRIC_MAX};
     seen s = {.pair = pair};
-    for (size_t i = 0; i < r->n_values; i++)
+    bool any = false;
+    for (size_t i = 0; i < r->n_values; i++) {
         s.n_values += r->values[i].pair == pair;
-    for (size_t i = 0; i < sizeof order / sizeof *order && !s.worst; i++) {
+        any = any || (r->values[i].pair == pair && pixels_differ(&r->values[i]));
+    }
+    for (size_t i = 0; any && i < sizeof order / sizeof *order && !s.worst; i++) {
         s.metric = order[i];
         s.worst = find_worst(r, pair, order[i]);
         s.display = order[i] == RL_METRIC_FLIP;
@@ -74,7 +77,7 @@ static bool is_identical(const rl_ab_results *r, size_t pair, size_t capture, in
         const rl_ab_value *v = &r->values[i];
         if (v->pair != pair || v->capture != capture || v->material != material)
             continue;
-        if (differs(v))
+        if (pixels_differ(v))
             return false;
         any = true;
     }

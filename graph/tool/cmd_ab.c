@@ -108,6 +108,7 @@ static void close_all(rl_ab_run *r)
     rl_experiment_close(&r->experiment);
     rl_pool_free(&r->pool);
     rl_trace_free(&r->trace);
+    rl_energy_ledger_free(&r->energy);
     rl_free(r->failures);
 }
 
@@ -166,6 +167,7 @@ int rl_cmd_ab(rl_tool *tool, rl_error *err)
     rl_ab_run run = {.tool = tool};
     if (!tool->args.run.out)
         tool->args.run.out = "out/ab";
+    tool->args.run.energy = true;
     tool->report->resumes = false;
     run.out = tool->args.run.out;
     int status = open_all(&run, err) ? RL_EXIT_WRONG : run_all(&run, err);

@@ -209,7 +209,8 @@ static rl_code read_other(const char *path, rl_compare_image *out, rl_error *err
             add_channel(out, name[c]);
         out->x = file.x;
         out->y = file.y;
-        out->view.encoded = file.type == RL_IMAGE_U8 || file.type == RL_IMAGE_U16;
+        out->levels = file.type == RL_IMAGE_U8 ? 255 : file.type == RL_IMAGE_U16 ? 65535 : 0;
+        out->view.encoded = out->levels > 0;
         out->data = channels != 1 && channels != 3;
         out->rec709 = true;
     }

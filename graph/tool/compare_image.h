@@ -12,6 +12,7 @@ typedef struct rl_compare_image {
     int x, y;           /* of the first pixel in the display window */
     bool data;          /* neither RGB nor a single channel, such as a normal: colour metrics do not apply */
     char channels[160]; /* "R G B" */
+    int levels;         /* of integers: 255, 65535; 0: floats */
     bool rec709;        /* false: the file has chromaticities, and they are others */
     bool has_xy;        /* the file has chromaticities: */
     double xy[8];       /* x, y of red, green, blue, white */

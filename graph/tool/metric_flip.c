@@ -50,7 +50,10 @@ struct rl_flip {
  * degrees. Both are normalized here, and their shares of the whole are put into the vertical filters. */
 static void make_sensitivity(rl_flip *f, int across, int down, double b, double share, int radius)
 {
-    f->across[across] = rl_filter_gaussian(RL_PIXELS_PER_DEGREE * sqrt(b / 2) / PI, radius);
+    double sigma = RL_PIXELS_PER_DEGREE * sqrt(b / 2) / PI;
+    int reach = (int)ceil(7 * sigma); /* e^(-7² / 2): below 3e-11 of the middle */
+    radius = reach < radius ? reach : radius;
+    f->across[across] = rl_filter_gaussian(sigma, radius);
     f->down[down] = f->across[across];
     for (int i = 0; i <= 2 * radius; i++)
         f->down[down].w[i] *= share;

@@ -35,16 +35,10 @@ RL_MATH_INLINE double rl_fast_log2(double x)
     double exponent = rl_of_bits((from >> 52) | 0x4330000000000000u) - (4503599627370496.0 + 1023);
     double m = rl_of_bits((from & 0x000fffffffffffffu) + root_half);
     double s = (m - 1) / (m + 1), t = s * s;
-    double sum = 1.0 / 19;
-    sum = sum * t + 1.0 / 17;
-    sum = sum * t + 1.0 / 15;
-    sum = sum * t + 1.0 / 13;
-    sum = sum * t + 1.0 / 11;
-    sum = sum * t + 1.0 / 9;
-    sum = sum * t + 1.0 / 7;
-    sum = sum * t + 1.0 / 5;
-    sum = sum * t + 1.0 / 3;
-    sum = sum * t + 1;
+    double t2 = t * t, t4 = t2 * t2, t8 = t4 * t4;
+    double low = (1 + t * (1.0 / 3)) + (1.0 / 5 + t * (1.0 / 7)) * t2;
+    double high = (1.0 / 9 + t * (1.0 / 11)) + (1.0 / 13 + t * (1.0 / 15)) * t2;
+    double sum = (low + high * t4) + (1.0 / 17 + t * (1.0 / 19)) * t8;
     return exponent + 2.8853900817779268 * s * sum; /* 2 / ln 2 */
 }
 
@@ -55,19 +49,11 @@ RL_MATH_INLINE double rl_fast_exp2(double t)
     t = t < -1000 ? -1000 : t;
     t = t > 1000 ? 1000 : t;
     double rounded = t + magic, r = (t - (rounded - magic)) * 0.69314718055994530942;
-    double sum = 1.0 / 479001600;
-    sum = sum * r + 1.0 / 39916800;
-    sum = sum * r + 1.0 / 3628800;
-    sum = sum * r + 1.0 / 362880;
-    sum = sum * r + 1.0 / 40320;
-    sum = sum * r + 1.0 / 5040;
-    sum = sum * r + 1.0 / 720;
-    sum = sum * r + 1.0 / 120;
-    sum = sum * r + 1.0 / 24;
-    sum = sum * r + 1.0 / 6;
-    sum = sum * r + 0.5;
-    sum = sum * r + 1;
-    sum = sum * r + 1;
+    double r2 = r * r, r4 = r2 * r2, r8 = r4 * r4;
+    double low = (1 + r) + (0.5 + r * (1.0 / 6)) * r2;
+    double middle = (1.0 / 24 + r * (1.0 / 120)) + (1.0 / 720 + r * (1.0 / 5040)) * r2;
+    double high = (1.0 / 40320 + r * (1.0 / 362880)) + (1.0 / 3628800 + r * (1.0 / 39916800)) * r2;
+    double sum = (low + middle * r4) + (high + r4 * (1.0 / 479001600)) * r8;
     return rl_of_bits(rl_bits_of(sum) + (rl_bits_of(rounded) << 52));
 }
 

@@ -14,14 +14,14 @@ typedef struct parser {
     rl_error *err;
 } parser;
 
-static rl_code wrong(const parser *p, const option *o, const char *expected, const char *found)
+static rl_code wrong(const parser *p, const rl_option *o, const char *expected, const char *found)
 {
     return rl_fail_file(p->err, RL_E_USAGE, p->place, "option '--%s' takes %s, found '%s'", o->name, expected,
                         found);
 }
 
 /* Appends to a list in the arena: doubling would waste little and copying costs nothing at this size. */
-static void *append(const parser *p, const option *o, size_t size)
+static void *append(const parser *p, const rl_option *o, size_t size)
 {
     void **list = (void **)((char *)p->out + o->at);
     size_t *n = (size_t *)((char *)p->out + o->count);
@@ -34,7 +34,7 @@ static void *append(const parser *p, const option *o, size_t size)
     return grown + size * (*n)++;
 }
 
-static rl_code take_setting(const parser *p, const option *o, const char *value)
+static rl_code take_setting(const parser *p, const rl_option *o, const char *value)
 {
     const char *equals = strchr(value, '=');
     if (!equals || equals == value)
@@ -47,7 +47,7 @@ static rl_code take_setting(const parser *p, const option *o, const char *value)
     return RL_OK;
 }
 
-static rl_code take_region(const parser *p, const option *o, const char *value, int out[4])
+static rl_code take_region(const parser *p, const rl_option *o, const char *value, int out[4])
 {
     const char *expected = "X,Y,W,H: four integers, width and height at least 1";
     const char *at = value;
@@ -66,7 +66,7 @@ static rl_code take_region(const parser *p, const option *o, const char *value, 
     return RL_OK;
 }
 
-static rl_code take_shard(const parser *p, const option *o, const char *value, int out[2])
+static rl_code take_shard(const parser *p, const rl_option *o, const char *value, int out[2])
 {
     size_t n = strcspn(value, "/");
     long long part, parts;
@@ -81,7 +81,7 @@ static rl_code take_shard(const parser *p, const option *o, const char *value, i
     return RL_OK;
 }
 
-static rl_code take_size(const parser *p, const option *o, const char *value, int out[2])
+static rl_code take_size(const parser *p, const rl_option *o, const char *value, int out[2])
 {
     size_t n = strcspn(value, "x");
     long long width, height;
@@ -96,7 +96,7 @@ static rl_code take_size(const parser *p, const option *o, const char *value, in
     return RL_OK;
 }
 
-static rl_code take_word(const parser *p, const option *o, const char *value, int *out)
+static rl_code take_word(const parser *p, const rl_option *o, const char *value, int *out)
 {
     int index = 0;
     for (const char *at = o->words; *at; index++) {
@@ -110,7 +110,7 @@ static rl_code take_word(const parser *p, const option *o, const char *value, in
     return wrong(p, o, o->words, value);
 }
 
-static rl_code take_integer(const parser *p, const option *o, const char *value, int *out)
+static rl_code take_integer(const parser *p, const rl_option *o, const char *value, int *out)
 {
     long long number;
     if (!rl_parse_int(value, &number) || number < o->min || number > o->max)
@@ -121,26 +121,26 @@ static rl_code take_integer(const parser *p, const option *o, const char *value,
     return RL_OK;
 }
 
-static rl_code take(const parser *p, const option *o, const char *value)
+static rl_code take(const parser *p, const rl_option *o, const char *value)
 {
     void *at = (char *)p->out + o->at;
     unsigned long long bytes;
     const char **item;
     switch (o->kind) {
-    case FLAG:
+    case RL_TAKES_FLAG:
         *(bool *)at = true;
         return RL_OK;
-    case TEXT:
+    case RL_TAKES_TEXT:
         if (!*value)
             return wrong(p, o, o->argument, value);
         *(const char **)at = value;
         return RL_OK;
-    case MAYBE:
+    case RL_TAKES_MAYBE:
         if (value && !*value)
             return wrong(p, o, o->argument, value);
         *(const char **)at = value ? value : "";
         return RL_OK;
-    case LIST:
+    case RL_TAKES_LIST:
         if (!*value)
             return wrong(p, o, o->argument, value);
         item = append(p, o, sizeof *item);
@@ -148,20 +148,20 @@ static rl_code take(const parser *p, const option *o, const char *value)
             return rl_fail_memory(p->err, sizeof *item);
         *item = value;
         return RL_OK;
-    case SETTING:
+    case RL_TAKES_SETTING:
         return take_setting(p, o, value);
-    case INTEGER:
+    case RL_TAKES_INTEGER:
         return take_integer(p, o, value, at);
-    case BYTES:
+    case RL_TAKES_BYTES:
         if (!rl_parse_bytes(value, &bytes))
             return wrong(p, o, "a size such as 512M or 4G", value);
         *(uint64_t *)at = bytes;
         return RL_OK;
-    case REGION:
+    case RL_TAKES_REGION:
         return take_region(p, o, value, at);
-    case SIZE:
+    case RL_TAKES_SIZE:
         return take_size(p, o, value, at);
-    case SHARD:
+    case RL_TAKES_SHARD:
         return take_shard(p, o, value, at);
     default:
         return take_word(p, o, value, at);
@@ -183,7 +183,7 @@ static rl_code unknown_option(const parser *p, const char *name)
 }
 
 /* The option exists, but not for this command: say for which. */
-static rl_code foreign_option(const parser *p, const option *o)
+static rl_code foreign_option(const parser *p, const rl_option *o)
 {
     rl_str text = {0};
     for (size_t i = 0; i < p->commands->n; i++)
@@ -195,7 +195,7 @@ static rl_code foreign_option(const parser *p, const option *o)
     return RL_E_USAGE;
 }
 
-static const option *find_option(const char *name, size_t length)
+static const rl_option *find_option(const char *name, size_t length)
 {
     for (size_t i = 0; i < rl_options_n; i++)
         if (strlen(rl_options_table[i].name) == length && !strncmp(rl_options_table[i].name, name, length))
@@ -209,7 +209,7 @@ static rl_code parse_option(const parser *p, int argc, char **argv, int *i)
 {
     const char *name = argv[*i] + 2, *equals = strchr(name, '=');
     size_t length = equals ? (size_t)(equals - name) : strlen(name);
-    const option *o = find_option(name, length);
+    const rl_option *o = find_option(name, length);
     if (!o) {
         char *copy = rl_arena_strndup(p->arena, name, length);
         return copy ? unknown_option(p, copy) : rl_fail_memory(p->err, length);
@@ -218,7 +218,7 @@ static rl_code parse_option(const parser *p, int argc, char **argv, int *i)
         return foreign_option(p, o);
     if (!o->argument)
         return equals ? wrong(p, o, "no value", equals + 1) : take(p, o, NULL);
-    if (equals || o->kind == MAYBE)
+    if (equals || o->kind == RL_TAKES_MAYBE)
         return take(p, o, equals ? equals + 1 : NULL);
     if (*i + 1 >= argc || !strncmp(argv[*i + 1], "--", 2))
         return rl_fail_file(p->err, RL_E_USAGE, p->place, "option '--%s' needs %s behind it", o->name,
@@ -234,8 +234,8 @@ static bool takes_several(const rl_command_info *command)
 
 static rl_code add_operand(const parser *p, const char *word)
 {
-    static const option operands = {.at = offsetof(rl_arguments, operands),
-                                    .count = offsetof(rl_arguments, n_operands)};
+    static const rl_option operands = {.at = offsetof(rl_arguments, operands),
+                                       .count = offsetof(rl_arguments, n_operands)};
     const char **item = append(p, &operands, sizeof *item);
     if (!item)
         return rl_fail_memory(p->err, sizeof *item);

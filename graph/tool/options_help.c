@@ -47,14 +47,14 @@ void rl_help_command(const rl_command_info *command, rl_str *out)
         rl_str_printf(out, "\n%s", command->more);
     rl_str_add(out, "\noptions:\n");
     for (size_t i = 0; i < rl_options_n; i++) {
-        const option *o = &rl_options_table[i];
+        const rl_option *o = &rl_options_table[i];
         char left[64];
         if (!(o->commands & command->bit))
             continue;
         strcpy(left, "--");
         strncat(left, o->name, 30);
         if (o->argument) {
-            if (o->kind != MAYBE) /* "--sheet[=FILE]" */
+            if (o->kind != RL_TAKES_MAYBE) /* "--sheet[=FILE]" */
                 strcat(left, " ");
             strncat(left, o->argument, 28);
         }

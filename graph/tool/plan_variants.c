@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "graph/run/session.h"
 #include "graph/tool/plan_variants_parts.h"
 #include "graph/tool/svg.h"
 
@@ -62,6 +63,13 @@ rl_code rl_variants_group_plan(const rl_ab_plan *plan, const rl_experiment *e, s
     else
         code = rl_plan_print_json(merged, NULL, 1, out, err);
     return code;
+}
+
+size_t rl_variants_compare_bytes(const rl_ab_plan *plan, const rl_experiment *e, size_t capture)
+{
+    const rl_geometry *g = &rl_experiment_session(e, 0)->sequences[capture].geometry;
+    size_t planes = 3 * plan->n_variants + (size_t)RL_METRICS * plan->n_pairs;
+    return planes * (size_t)g->width * (size_t)g->height * sizeof(float);
 }
 
 /* ---- text ---------------------------------------------------------------------------------------------- */
@@ -132,6 +140,9 @@ static rl_code print_text(const rl_ab_plan *plan, const rl_experiment *e, rl_str
             print_nodes(plan, e, c, g, out);
             code = rl_variants_group_plan(plan, e, c, g, RL_PLAN_TEXT, out, err);
         }
+        char bytes[32];
+        rl_str_printf(out, "  and to compare the pictures, in `relit ab`: %s\n",
+                      rl_format_bytes(rl_variants_compare_bytes(plan, e, c), bytes));
     }
     return code;
 }

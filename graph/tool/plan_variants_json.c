@@ -93,6 +93,7 @@ rl_code rl_plan_variants_json(const rl_ab_plan *plan, const rl_experiment *e, rl
         put(o, "capture", json_string(rl_session_capture_name(first, c)), &failed);
         put(o, "variants", variants_json(plan, &failed), &failed);
         put(o, "cost", cost_json(plan, e), &failed);
+        put(o, "compare_bytes", json_integer((json_int_t)rl_variants_compare_bytes(plan, e, c)), &failed);
         put(o, "groups", groups, &failed);
         char *text = failed ? NULL : json_dumps(o, JSON_COMPACT | JSON_REAL_PRECISION(6));
         if (text)

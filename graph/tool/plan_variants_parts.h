@@ -12,6 +12,9 @@ void rl_variants_users(const rl_ab_plan *plan, const rl_merged_node *node, const
 rl_code rl_variants_group_plan(const rl_ab_plan *plan, const rl_experiment *experiment, size_t capture,
                                size_t group, rl_plan_format format, rl_str *out, rl_error *err);
 
+/* What rl_ab_measure takes for a frame: clamped pictures, and maps of all metrics (ab.h). */
+size_t rl_variants_compare_bytes(const rl_ab_plan *plan, const rl_experiment *experiment, size_t capture);
+
 rl_code rl_plan_variants_json(const rl_ab_plan *plan, const rl_experiment *experiment, rl_str *out,
                               rl_error *err);
 
