@@ -277,8 +277,8 @@ static void test_thresholds_that_check_nothing(void **state)
     assert_int_equal(err.code, RL_E_DATA);
     assert_non_null(strstr(err.text, "there is no ssim.mean to check: no frame was compared"));
     err = (rl_error){0};
-    check(&arena, "energy=0.01", &err); /* somebody else's */
-    assert_int_equal(err.code, RL_OK);
+    check(&arena, "energy=0.01", &err); /* no ledger was kept */
+    assert_int_equal(err.code, RL_E_DATA);
     rl_threshold t;
     static const struct {
         const char *text, *says;
