@@ -371,19 +371,19 @@ static inline void scatter_reject(rejected_t *r, int c, floatv weight, intv insi
     r->off_screen[c] += scatter_keep(weight, ~inside);
 }
 
-/* Channel c of a result: the pixel's own light, the weights w of the samples that count and their light times
+/* Channel c of a result: the pixel's own light, the share of the result that is not left to it, the weights w of the samples that count and their light times
  * weights, those that are rejected (`black`: they are in w), and what the filter gives, before its clamps and
  * after. */
-static inline void scatter_account(floatv *out, int c, floatv own, floatv w, floatv light, const rejected_t *r,
+static inline void scatter_account(floatv *out, int c, floatv own, float share, floatv w, floatv light, const rejected_t *r,
                                    intv black, floatv unclamped, floatv given, float least)
 {
     floatv all = w + scatter_keep(r->border[c] + r->off_screen[c], ~black);
     intv any = all > least;
     floatv per = scatter_keep(1.0f / all, any);
-    out[3 + c] = own * r->border[c] * per;
-    out[6 + c] = own * r->off_screen[c] * per;
+    out[3 + c] = share * own * r->border[c] * per;
+    out[6 + c] = share * own * r->off_screen[c] * per;
     out[9 + c] = unclamped - given;
-    out[12 + c] = scatter_keep(unclamped - light * per, any);
+    out[12 + c] = scatter_keep(unclamped - fma((floatv)share, light * per - own, own), any);
 }
 
 /* A result's part of the ledger, of the pixels at `at`; planes are `plane` floats apart. */

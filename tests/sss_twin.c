@@ -314,6 +314,41 @@ static int patterns_of(int n)
     return most % 2 ? most : most - 1;
 }
 
+/* Weights of pattern j of n taps on a plane that faces the camera, beside the mean of all patterns. Those of
+ * the last few materials are kept: there are many pixels. */
+static const double *shares_of(int n, const double d[3], int j)
+{
+    enum { KEPT = 8, MOST = 15 };
+    static struct {
+        int n;
+        double d[3], share[MOST][3];
+    } kept[KEPT], *k;
+    static int next;
+    for (int i = 0; i < KEPT; i++)
+        if (kept[i].n == n && !memcmp(kept[i].d, d, sizeof kept[i].d))
+            return kept[i].share[j];
+    k = &kept[next++ % KEPT];
+    memset(k, 0, sizeof *k);
+    k->n = n;
+    memcpy(k->d, d, sizeof k->d);
+    float *x = rl_malloc((size_t)n * 12), *y = x + n, *weight = y + n;
+    double mean[3] = {0}, unused[3];
+    int count = patterns_of(n);
+    for (int p = 0; p < count; p++) {
+        rl_burley_mixture_taps((size_t)n, (p + 0.5) / count, d, x, y, weight, unused);
+        for (int c = 0; c < 3; c++) {
+            for (int i = 0; i < n; i++)
+                k->share[p][c] += rl_burley_profile(hypot(x[i], y[i]), d[c]) * weight[i];
+            mean[c] += k->share[p][c] / count;
+        }
+    }
+    for (int p = 0; p < count; p++)
+        for (int c = 0; c < 3; c++)
+            k->share[p][c] /= mean[c];
+    rl_free(x);
+    return k->share[j];
+}
+
 void twin_burley(const twin_scene *s, int x, int y, int n, int seed, double filtered[3])
 {
     const camera_t *c = &s->frame.camera;
@@ -327,14 +362,17 @@ void twin_burley(const twin_scene *s, int x, int y, int n, int seed, double filt
     float kx = c->focal[0] / (middle * inv_d), ky = c->focal[1] / (middle * inv_d);
     double choice[2], offset;
     choice_of(s, x, y, seed, choice);
-    offset = (floor(choice[1] * patterns_of(n)) + 0.5) / patterns_of(n);
+    int pattern = (int)floor(choice[1] * patterns_of(n));
+    offset = (pattern + 0.5) / patterns_of(n);
     float co = (float)cos(2 * pi * floor(choice[0] * 256) / 256),
           si = (float)sin(2 * pi * floor(choice[0] * 256) / 256);
     double z = s->depth[at(s, x, y)], scale = z / middle, own = twin_area(s, x, y), sum[3] = {0},
            weights[3] = {0}, planar[3] = {0};
     tangent_t tangent = tangent_of(s, x, y);
+    double proportions[3] = {(double)d[0] / most, (double)d[1] / most, (double)d[2] / most};
+    const double *share = shares_of(n, proportions, pattern);
     float *tx = rl_malloc((size_t)n * 12), *ty = tx + n, *tw = ty + n;
-    rl_burley_taps((size_t)n, offset, tx, ty, tw);
+    rl_burley_mixture_taps((size_t)n, offset, proportions, tx, ty, tw, (double[3]){0});
     for (int i = 0; i < n; i++) {
         float u = fmaf(tx[i], co, -(ty[i] * si)), v = fmaf(tx[i], si, ty[i] * co);
         float x_disk = u;
@@ -360,8 +398,12 @@ void twin_burley(const twin_scene *s, int x, int y, int n, int seed, double filt
         }
     }
     for (int k = 0; k < 3; k++) {
-        double over = (1 - tangent.cosine) / weights[k] + (s->surface ? tangent.cosine / planar[k] : 0);
-        filtered[k] = weights[k] > 1e-12 ? sum[k] * over : s->diffuse[k * plane(s) + at(s, x, y)];
+        double own_light = s->diffuse[k * plane(s) + at(s, x, y)], v = own_light;
+        if (weights[k] > 1e-12) {
+            v = fmax(v + share[k] * (sum[k] / weights[k] - v), fmin(v, 0));
+            v *= s->surface ? 1 - tangent.cosine + tangent.cosine * weights[k] / planar[k] : 1;
+        }
+        filtered[k] = v;
     }
     rl_free(tx);
 }
