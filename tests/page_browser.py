@@ -11,11 +11,13 @@ import json
 import math
 import os
 import re
+import struct
 import subprocess
 import sys
 import tempfile
 import time
 import urllib.request
+import zlib
 
 WIDTH, HEIGHT, FIRST = 160, 96, 101
 
@@ -57,6 +59,7 @@ class Browser:
             self.driver.kill()
             raise Missing(f"chromium: {str(error).splitlines()[0]}")
         self.session = f"/session/{made['sessionId']}"
+        self.cdp("Emulation.setFocusEmulationEnabled", enabled=True)
 
     def close(self):
         try:
@@ -207,13 +210,13 @@ class Page:
         width, height, raw = data[0], data[1], base64.b64decode(data[2])
         return width, height, lambda x, y: list(raw[4 * (y * width + x):4 * (y * width + x) + 3])
 
-    def compare(self, want, tolerance, points=None, half=False):
+    def compare(self, want, tolerance, points=None, half=False, size=(WIDTH, HEIGHT)):
         """Every few pixels of the picture at scale 1, which must be in the middle of its pane, against want(x, y)."""
         width, height, got = self.pixels()
         left, right = 0, width // 2 - 1 if half else width
-        x0, y0 = (left + right) // 2 - WIDTH // 2, height // 2 - HEIGHT // 2
+        x0, y0 = (left + right) // 2 - size[0] // 2, height // 2 - size[1] // 2
         worst, count = (0, ""), 0
-        for x, y in points or [(x, y) for y in range(0, HEIGHT, 3) for x in range(WIDTH)]:
+        for x, y in points or [(x, y) for y in range(0, size[1], 3) for x in range(size[0])]:
             if not left <= x0 + x < right:
                 continue
             is_, should = got(x0 + x, y0 + y), want(x, y)
@@ -478,6 +481,8 @@ def tables_and_links(p):
     p.b.settle()
     links = p.b.js("return [...document.querySelectorAll('#files a')].map(a => a.getAttribute('href'))")
     check(links[:2] == ["./variant%200/monkey.0101.exr", "./variant%201/monkey.0101.exr"] and len(links) == 18, f"links {links[:3]}")
+    p.b.js("document.querySelectorAll('.node')[2].focus()")
+    check("sss_burley" in p.text(".detail") and "light.diffuse" in p.text(".detail"), f"a node in focus says what it reads: {p.text('.detail')}")
     p.focus(".plot")
     p.b.keys("Right", "Right")
     check("frame 102 (linked)" in p.text(".tip"), f"the plot is read by keys: {p.text('.tip')}")
@@ -580,6 +585,55 @@ def reference_and_failed_frame(p):
     check("reference" in p.text("#pick-a") and "<b>No such file</b>" in p.text("#failures"), "reference and failure")
 
 
+def read_png(path):
+    """(width, height, pixel(x, y)) of an 8-bit RGB or RGBA file."""
+    with open(path, "rb") as file:
+        data = file.read()
+    at, packed, head = 8, b"", None
+    while at < len(data):
+        size, kind = struct.unpack(">I4s", data[at:at + 8])
+        if kind == b"IHDR":
+            head = struct.unpack(">IIBBBBB", data[at + 8:at + 21])
+        if kind == b"IDAT":
+            packed += data[at + 8:at + 8 + size]
+        at += 12 + size
+    width, height, depth, color = head[:4]
+    n = {2: 3, 6: 4}[color]
+    check(depth == 8, "an 8-bit file")
+    raw, stride, rows, before = zlib.decompress(packed), width * n, [], bytes(width * n)
+    for y in range(height):
+        method, row = raw[y * (stride + 1)], bytearray(raw[y * (stride + 1) + 1:(y + 1) * (stride + 1)])
+        for i in range(stride):
+            a, b, c = row[i - n] if i >= n else 0, before[i], before[i - n] if i >= n else 0
+            if method == 4:
+                p = a + b - c
+                d = (abs(p - a), abs(p - b), abs(p - c))
+                add = (a, b, c)[d.index(min(d))]
+            else:
+                add = (0, a, b, (a + b) // 2)[method]
+            row[i] = (row[i] + add) & 255
+        rows.append(bytes(row))
+        before = rows[-1]
+    return width, height, lambda x, y: list(rows[y][x * n:x * n + 3])
+
+
+@test
+def real_report(p):
+    """A page of `relit ab` on the bundled capture shows what the run wrote as PNG, but for the table's error."""
+    p.open("real/report.html")
+    p.focus()
+    p.b.keys("f", "1")
+    for name in ["post", "pre_post"]:
+        width, height, want = read_png(os.path.join(p.folder, "real", name, "monkey.0001.png"))
+        p.compare(want, TABLE, size=(width, height), points=[(x, y) for x in range(0, width, 5) for y in range(0, height, 5)])
+        p.b.keys("Space")
+    check("skin" in p.text("#summary") and p.b.js("return document.querySelectorAll('.node').length") > 4, "its words and graph")
+    p.b.js("document.querySelector('#files details').open = true")
+    p.b.settle()
+    links = p.b.js("return [...document.querySelectorAll('#files a')].map(a => decodeURIComponent(new URL(a.href).pathname))")
+    check(len(links) == 4 and all(os.path.isfile(f) for f in links), f"links lead to files: {links[:2]}")
+
+
 @test
 def plan_page(p):
     """relit plan --format html: graph, times, lifetimes, memory."""
@@ -616,7 +670,7 @@ def run_quiet(p, name):
 def run_tests(folder, names):
     status = 0
     # The second browser has no WebGL: the pages fall back.
-    for label, flags, only in [("webgl", [], None), ("canvas", ["--disable-3d-apis"], ["renderer", "wipe", "flip", "side_by_side", "exposure", "heat_map", "zoom_and_pan", "phone"])]:
+    for label, flags, only in [("webgl", [], None), ("canvas", ["--disable-3d-apis"], ["renderer", "wipe", "flip", "side_by_side", "exposure", "heat_map", "zoom_and_pan", "phone", "real_report"])]:
         browser = Browser(*flags)
         try:
             page = Page(browser, folder)

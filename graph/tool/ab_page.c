@@ -124,17 +124,18 @@ void rl_page_relative(const char *folder, const char *path, rl_str *out)
         path += 2;
     if (!strcmp(folder, "."))
         folder = "";
-    if ((*folder == '/') != (*path == '/') || !strncmp(folder, "..", 2)) {
-        rl_str_add(out, path);
-        return;
-    }
     for (; folder[i] && folder[i] == path[i]; i++)
         if (folder[i] == '/')
             same = i + 1;
     if (!folder[i] && path[i] == '/')
         same = i + 1;
+    const char *left = folder + (same < strlen(folder) ? same : strlen(folder));
     bool inside = false;
-    for (const char *c = folder + (same < strlen(folder) ? same : strlen(folder)); *c; c++) {
+    if ((*folder == '/') != (*path == '/') || strstr(left, "..")) { /* no way is known */
+        rl_str_add(out, path);
+        return;
+    }
+    for (const char *c = left; *c; c++) {
         if (*c != '/' && !inside)
             rl_str_add(out, "../");
         inside = *c != '/';
