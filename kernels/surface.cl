@@ -37,7 +37,8 @@ typedef struct surface_t {
 } surface_t;
 
 typedef struct ray_t {
-    floatv l[3], nl, falloff; /* towards the light, unit; n.l; 1/d^2 and cone */
+    floatv l[3], nl, falloff; /* towards the light, unit; n.l; 1/d^2 and cone; of area lights' middle */
+    floatv inverse;           /* 1/d; not of directional lights */
     floatv visibility, shadow_thickness;
     int has_thickness; /* shadow_thickness is known */
 } ray_t;
@@ -108,9 +109,14 @@ static inline void aim(ray_t *r, const surface_t *s, constant light_t *light, co
     for (int i = 0; i < 3; i++)
         r->l[i] *= inverse;
     r->nl = to_narrow(nl) * inverse;
+    r->inverse = inverse;
     r->falloff = inverse * inverse;
     if (light->type == LIGHT_SPOT)
         r->falloff *= cone(light, r->l);
+    if (light->type == LIGHT_RECT) { /* seen as a point, from far off */
+        floatv c = -fma(r->l[0], light->direction[0], fma(r->l[1], light->direction[1], r->l[2] * light->direction[2]));
+        r->falloff *= light->two_sided ? fabs(c) : fmax(c, 0.0f);
+    }
 }
 
 /* D V of GGX with the height-correlated Smith term (Heitz 2014), and Schlick's (1 - v.h)^5 in `fresnel`. 1 - (n.h)^2
@@ -130,4 +136,35 @@ static inline floatv lobe(const surface_t *s, const ray_t *r, floatv roughness, 
     floatv smith = nl * sqrt(fma(nv * nv, 1.0f - a2, a2)) + nv * sqrt(fma(nl * nl, 1.0f - a2, a2));
     *fresnel = f2 * f2 * f;
     return a2 * (0.5f / RL_PI) / (denominator * denominator * fmax(smith, 1e-12f));
+}
+
+/* How much of the light on the back face comes through, without cosine, F_in and 1/pi (DESIGN 4.5): the slab of
+ * Golubev 2018, (e^-st + 3 e^-st/3) / 4, or Helix's Beer-Lambert law. `back` is |n.l| there. */
+static inline void through(constant material_t *m, const surface_t *s, const ray_t *r, floatv back, floatv *out)
+{
+    const float log2_e = 1.44269504f;
+    int mode = m->profile_transmission;
+    floatv along = r->shadow_thickness * back; /* from the light's ray to the normal */
+    floatv known = rl_select(along, s->thickness, s->thickness > 0.0f);
+    floatv t = known, visibility = 1.0f;
+    if (mode == THIN) {
+        visibility = r->visibility; /* of both faces; but the object itself is no shadow on its back */
+        if (r->has_thickness)
+            visibility = rl_select(visibility, 1.0f, along <= 2.0f * s->thickness + 1e-3f);
+    } else if (m->profile_thickness_from == FROM_SHADOW) {
+        t = along;
+    } else if (m->profile_thickness_from == FROM_MAX) {
+        t = fmax(s->thickness, along);
+    }
+    visibility = rl_select(0.0f, visibility, t > 0.0f); /* unknown: nothing */
+    for (int i = 0; i < 3; i++) {
+        if (mode == BEER_LAMBERT) {
+            float k = log2(m->profile_transmittance_color[i]) / (1e-3f * m->profile_transmittance_distance_mm);
+            out[i] = visibility * rl_exp2(t * k);
+        } else {
+            float k = -log2_e / (3e-3f * m->profile_scatter_distance_mm[i]);
+            floatv q = rl_exp2(t * k);
+            out[i] = visibility * 0.25f * q * fma(q, q, 3.0f);
+        }
+    }
 }

@@ -69,7 +69,7 @@ static void build_one(void *ctx, int i)
     if ((size_t)i < x->plan->n_nodes) {
         const rl_plan_node *n = &x->plan->nodes[i];
         const rl_graph_node *g = &x->plan->graph->nodes[n->node];
-        if (!rl_kernel_text(&arena, x->plan, n, x->march, &text, err))
+        if (!rl_kernel_text(&arena, x->plan, n, x->kinds, &text, err))
             rl_program_build(x->device, g->name, rl_str_text(&text), false, &x->nodes[n->node].program, err);
         if (err->code == RL_E_BUILD && !err->file[0])
             rl_fail(err, RL_E_BUILD, g->where, "pass '%s' (%s) does not build", g->name, g->pass->name);
@@ -104,8 +104,9 @@ static rl_code build_programs(rl_executor *x, int threads, rl_error *err)
     return code;
 }
 
-rl_code rl_executor_new(rl_device *device, const rl_plan *plan, const rl_materials *materials, bool march,
-                        int threads, const rl_log *log, rl_executor **out, rl_error *err)
+rl_code rl_executor_new(rl_device *device, const rl_plan *plan, const rl_materials *materials,
+                        const rl_light_setup *lights, int threads, const rl_log *log, rl_executor **out,
+                        rl_error *err)
 {
     *out = NULL;
     rl_executor *x = rl_calloc(1, sizeof *x);
@@ -114,7 +115,7 @@ rl_code rl_executor_new(rl_device *device, const rl_plan *plan, const rl_materia
     x->device = device;
     x->plan = plan;
     x->material_table = materials;
-    x->march = march;
+    x->kinds = lights->kinds;
     x->log = log;
     x->nodes = rl_arena_array(&x->arena, plan->graph->n_nodes + 1, sizeof *x->nodes);
     x->slots = rl_arena_array(&x->arena, plan->n_slots + 1, sizeof *x->slots);
@@ -126,6 +127,10 @@ rl_code rl_executor_new(rl_device *device, const rl_plan *plan, const rl_materia
         code = make_constants(x, plan->nodes[i].node, err);
     if (!code)
         code = upload(x, materials->data, materials->count * materials->entry_bytes, &x->materials, err);
+    if (!code && lights->n_profiles)
+        code = upload(x, lights->profiles, lights->n_profiles * sizeof *lights->profiles, &x->profiles, err);
+    if (!code && lights->n_sky)
+        code = upload(x, lights->sky, lights->n_sky * sizeof *lights->sky, &x->sky, err);
     if (!code)
         code = rl_memory_new(device, sizeof(frame_t), 0, &x->frame, err);
     if (code)
@@ -161,6 +166,8 @@ void rl_executor_free(rl_executor **executor)
     rl_memory_free(&x->frame);
     rl_memory_free(&x->lights);
     rl_memory_free(&x->ambient);
+    rl_memory_free(&x->profiles);
+    rl_memory_free(&x->sky);
     rl_arena_free(&x->arena);
     rl_free(x);
 }
@@ -286,7 +293,7 @@ static rl_code run_kernel(rl_executor *x, const rl_plan_step *s, const rl_frame_
     const rl_step *step = &pass->steps.rows[s->step];
     rl_memory *args[MOST_ARGUMENTS];
     size_t k = 0;
-    if (pass->ports.n + 6 > MOST_ARGUMENTS)
+    if (pass->ports.n + 8 > MOST_ARGUMENTS)
         return rl_fail(err, RL_E_CONFIG, g->where, "pass '%s' (%s) has too many ports (%zu)", g->name,
                        pass->name, pass->ports.n);
     for (size_t i = 0; i < pass->ports.n; i++)
@@ -299,6 +306,10 @@ static rl_code run_kernel(rl_executor *x, const rl_plan_step *s, const rl_frame_
         args[k++] = x->lights;
     if (pass->ambient)
         args[k++] = x->ambient;
+    if (pass->light_tables) {
+        args[k++] = x->profiles;
+        args[k++] = x->sky;
+    }
     if (pass->tables)
         args[k++] = n->tables;
     rl_dispatch d;

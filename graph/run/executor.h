@@ -17,10 +17,19 @@ typedef struct rl_executor rl_executor;
 /* The buffers that belong to one frame in flight: what its source fills and what its writers read. */
 typedef struct rl_frame_buffers rl_frame_buffers;
 
-/* Builds the programs of all live nodes, on up to `threads` threads. Keeps pointers to all arguments.
- * `march`: some light may have SHADOW_MARCH; without, its code is left out and such a light has no shadow. */
-rl_code rl_executor_new(rl_device *device, const rl_plan *plan, const rl_materials *materials, bool march,
-                        int threads, const rl_log *log, rl_executor **out, rl_error *err);
+/* What programs of passes with .lights or .light_tables must be able to do (RL_LIGHTS_…, kernel_source.h),
+ * and the large tables of those with .light_tables: kernels/shared.h describes them. NULL and 0: none. */
+typedef struct rl_light_setup {
+    unsigned kinds;
+    const float *profiles, *sky;
+    size_t n_profiles, n_sky; /* floats */
+} rl_light_setup;
+
+/* Builds the programs of all live nodes, on up to `threads` threads. Keeps pointers to all arguments but
+ * `lights`, whose tables are copied. */
+rl_code rl_executor_new(rl_device *device, const rl_plan *plan, const rl_materials *materials,
+                        const rl_light_setup *lights, int threads, const rl_log *log, rl_executor **out,
+                        rl_error *err);
 void rl_executor_free(rl_executor **executor);
 
 /* Allocates slots and history for frames of this size (nothing happens when it is the size already); history

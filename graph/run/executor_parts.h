@@ -15,15 +15,16 @@ struct rl_executor {
     rl_device *device;
     const rl_plan *plan;
     const rl_materials *material_table;
-    bool march; /* programs of passes with .lights know of SHADOW_MARCH */
+    unsigned kinds; /* of lights: RL_LIGHTS_… */
     const rl_log *log;
     rl_node_state *nodes; /* [graph->n_nodes] */
     rl_program *convert;
     rl_memory *materials, *frame, *lights, *ambient;
-    rl_geometry geometry; /* columns 0: no size yet */
-    rl_memory **slots;    /* [plan->n_slots] */
-    rl_memory **history;  /* [plan->n_buffers][2]; NULL where the buffer is not HISTORY */
-    int newest;           /* which half of the pairs this frame writes */
+    rl_memory *profiles, *sky; /* NULL: none */
+    rl_geometry geometry;      /* columns 0: no size yet */
+    rl_memory **slots;         /* [plan->n_slots] */
+    rl_memory **history;       /* [plan->n_buffers][2]; NULL where the buffer is not HISTORY */
+    int newest;                /* which half of the pairs this frame writes */
     bool has_history;
     camera_t previous;
 };

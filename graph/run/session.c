@@ -87,6 +87,7 @@ void rl_session_close(rl_session **session)
     rl_device_close(&s->device);
     rl_ocio_free(&s->ocio);
     rl_pool_free(&s->pool);
+    rl_free(s->sky);
     rl_arena_free(&s->arena);
     rl_free(s);
 }
@@ -97,8 +98,9 @@ rl_code rl_session_prepare(rl_session *s, rl_error *err)
         s->device ? RL_OK : rl_device_open(s->options.device, s->options.threads, s->log, &s->device, err);
     for (size_t i = 0; i < s->n_sequences && !code; i++)
         if (!s->sequences[i].executor)
-            code = rl_executor_new(s->device, s->sequences[i].plan, s->sequences[i].materials,
-                                   s->sequences[i].march, s->threads, s->log, &s->sequences[i].executor, err);
+            code =
+                rl_executor_new(s->device, s->sequences[i].plan, s->sequences[i].materials,
+                                &s->sequences[i].setup, s->threads, s->log, &s->sequences[i].executor, err);
     return code;
 }
 

@@ -1,0 +1,240 @@
+/* GGX as a linearly transformed cosine (Heitz et al. 2016; passes/ltc_table.h), and light from polygons under it. Behind
+ * surface.cl, in front of area.cl and light_tables.cl. */
+
+/* ---- the table -------------------------------------------------------------------------------------------- */
+
+/* A pixel's lobe: the frame (view's part across the normal, across both, normal), M^-1 in it, the albedo. */
+typedef struct ltc_t {
+    floatv across[3], third[3];
+    floatv m[4]; /* M^-1 = (m0 0 m1; 0 1 0; m2 0 m3) */
+    floatv albedo, fresnel, share;
+} ltc_t;
+
+/* Bilinear in roughness and sqrt(1 - n.v). */
+static inline void ltc_values(ltc_t *t, constant const float *table, floatv roughness, floatv nv)
+{
+    float row[RL_W], column[RL_W], v[RL_LTC_VALUES][RL_W];
+    rl_vstore(clamp(roughness, 0.0f, 1.0f) * (float)(RL_LTC_SIDE - 1), 0, row);
+    rl_vstore(sqrt(clamp(1.0f - nv, 0.0f, 1.0f)) * (float)(RL_LTC_SIDE - 1), 0, column);
+    for (int i = 0; i < RL_W; i++) {
+        int r = min((int)row[i], RL_LTC_SIDE - 2), c = min((int)column[i], RL_LTC_SIDE - 2);
+        constant const float *at = table + (r * RL_LTC_SIDE + c) * RL_LTC_VALUES, *below = at + RL_LTC_SIDE * RL_LTC_VALUES;
+        float8 a = mix(vload8(0, at), vload8(1, at), column[i] - (float)c);
+        float8 b = mix(vload8(0, below), vload8(1, below), column[i] - (float)c);
+        float values[RL_LTC_VALUES];
+        vstore8(mix(a, b, row[i] - (float)r), 0, values);
+        for (int k = 0; k < RL_LTC_VALUES; k++)
+            v[k][i] = values[k];
+    }
+    floatv alpha = fmax(roughness * roughness, ALPHA_MIN);
+    t->m[0] = rl_vload(0, v[0]);
+    t->m[1] = rl_vload(0, v[1]);
+    t->m[2] = rl_vload(0, v[2]) * alpha;
+    t->m[3] = rl_vload(0, v[3]) * alpha;
+    t->albedo = rl_vload(0, v[4]);
+    t->fresnel = rl_vload(0, v[5]);
+    t->share = rl_vload(0, v[6]);
+}
+
+/* The frame; where the view is along the normal any will do. */
+static inline void ltc_frame(ltc_t *t, const surface_t *s)
+{
+    floatv along = dot3(s->v, s->n), length = 0.0f, other[3];
+    intv steep = fabs(s->n[0]) > 0.5f;
+    other[0] = rl_select(1.0f, 0.0f, steep);
+    other[1] = rl_select(0.0f, 1.0f, steep);
+    other[2] = 0.0f;
+    floatv off = dot3(other, s->n);
+    for (int i = 0; i < 3; i++)
+        t->across[i] = fma(-along, s->n[i], s->v[i]);
+    intv along_view = dot3(t->across, t->across) < 1e-8f;
+    for (int i = 0; i < 3; i++)
+        t->across[i] = rl_select(t->across[i], fma(-off, s->n[i], other[i]), along_view);
+    length = rsqrt(fmax(dot3(t->across, t->across), 1e-12f));
+    for (int i = 0; i < 3; i++)
+        t->across[i] *= length;
+    for (int i = 0; i < 3; i++)
+        t->third[i] = s->n[(i + 1) % 3] * t->across[(i + 2) % 3] - s->n[(i + 2) % 3] * t->across[(i + 1) % 3];
+}
+
+#if LIGHTS_AREA
+
+/* ---- polygons --------------------------------------------------------------------------------------------- */
+
+/* A light in a pixel's frame, metres or any other length: its middle and two half axes; corners at c + p u + q v. */
+typedef struct patch_t {
+    floatv c[3], u[3], v[3];
+    int corners;
+} patch_t;
+
+enum { RECT_CORNERS = 4, DISK_CORNERS = 16 };
+constant float rect_corner[2 * (RECT_CORNERS + 1)] = {-1, -1, 1, -1, 1, 1, -1, 1, -1, -1};
+/* A circle's area, pi: radius sqrt(2 pi / (n sin(2 pi / n))), n = 16. */
+#define DISK_A 1.01300156f
+#define DISK_B 0.93589140f
+#define DISK_C 0.71630027f
+#define DISK_D 0.38765891f
+constant float disk_corner[2 * (DISK_CORNERS + 1)] = {
+    DISK_A,  0,       DISK_B,  DISK_D,  DISK_C,  DISK_C,  DISK_D,  DISK_B,  0,       DISK_A,  -DISK_D, DISK_B,
+    -DISK_C, DISK_C,  -DISK_B, DISK_D,  -DISK_A, 0,       -DISK_B, -DISK_D, -DISK_C, -DISK_C, -DISK_D, -DISK_B,
+    0,       -DISK_A, DISK_D,  -DISK_B, DISK_C,  -DISK_C, DISK_B,  -DISK_D, DISK_A,  0};
+
+static inline void corner(const patch_t *p, int i, floatv *a, floatv *e)
+{
+    constant const float *at = (p->corners == RECT_CORNERS ? rect_corner : disk_corner) + 2 * i;
+    for (int k = 0; k < 3; k++) {
+        a[k] = fma(at[0], p->u[k], fma(at[1], p->v[k], p->c[k]));
+        e[k] = fma(at[2] - at[0], p->u[k], (at[3] - at[1]) * p->v[k]);
+    }
+}
+
+/* Where a polygon goes below z = 0, and where it comes back. */
+typedef struct horizon_t {
+    floatv down[3], up[3];
+} horizon_t;
+
+static inline void clear_horizon(horizon_t *h)
+{
+    for (int i = 0; i < 3; i++)
+        h->down[i] = h->up[i] = 0.0f;
+}
+
+/* Leaves of the edge from a to a + e what is above z = 0. */
+static inline void above(floatv *a, floatv *e, horizon_t *h)
+{
+    floatv first = a[2], last = a[2] + e[2], run = first - last;
+    intv out = first < 0.0f, end = last < 0.0f;
+    floatv at = clamp(first / rl_select(run, 1.0f, fabs(run) < 1e-30f), 0.0f, 1.0f);
+    floatv from = rl_select(0.0f, at, out), to = rl_select(1.0f, at, end);
+    for (int i = 0; i < 3; i++) {
+        floatv start = fma(from, e[i], a[i]);
+        h->up[i] = rl_select(h->up[i], i == 2 ? (floatv)0.0f : start, out & ~end);
+        h->down[i] = rl_select(h->down[i], i == 2 ? (floatv)0.0f : fma(to, e[i], a[i]), ~out & end);
+        a[i] = start;
+        e[i] *= to - from;
+    }
+}
+
+/* The edge that closes it along the horizon; none where nothing crossed. */
+static inline void closing(const horizon_t *h, floatv *a, floatv *e)
+{
+    for (int i = 0; i < 3; i++) {
+        a[i] = h->down[i];
+        e[i] = h->up[i] - h->down[i];
+    }
+}
+
+/* acos(x) / sqrt(1 - x^2) for x = cos of an angle whose sine is given; relative error 1e-6. */
+static inline floatv angle_over_sine(floatv x, floatv sine)
+{
+    floatv z = fmax(1.0f - fabs(x), 0.0f), p = 0.0273540326f;
+    p = fma(p, z, -0.0529885922f);
+    p = fma(p, z, 0.0709678831f);
+    p = fma(p, z, -0.00589297864f);
+    p = fma(p, z, 0.0657780209f);
+    p = fma(p, z, 0.132187281f);
+    p = fma(p, z, 0.3333905f);
+    p = fma(p, z, 0.999999536f);
+    return rl_select(p, RL_PI / fmax(sine, 1e-6f) - p, x < 0.0f);
+}
+
+/* An edge's part of twice the polygon's vector irradiance: its angle along the normal of its plane through the origin. a x b is
+ * a x e, which does not cancel. */
+static inline void edge_vector(const floatv *a, const floatv *e, floatv *out)
+{
+    floatv b[3], normal[3];
+    for (int i = 0; i < 3; i++) {
+        b[i] = a[i] + e[i];
+        normal[i] = a[(i + 1) % 3] * e[(i + 2) % 3] - a[(i + 2) % 3] * e[(i + 1) % 3];
+    }
+    floatv inverse = rsqrt(fmax(dot3(a, a), 1e-18f)) * rsqrt(fmax(dot3(b, b), 1e-18f));
+    floatv g = angle_over_sine(dot3(a, b) * inverse, sqrt(dot3(normal, normal)) * inverse) * inverse;
+    for (int i = 0; i < 3; i++)
+        out[i] = normal[i] * g;
+}
+
+static inline floatv edge_sum(const floatv *a, const floatv *e)
+{
+    floatv v[3];
+    edge_vector(a, e, v);
+    return v[2];
+}
+
+/* Corners run clockwise as the surface sees the side that shines. */
+static inline floatv sided(floatv sum, int two_sided)
+{
+    return 0.5f * (two_sided ? fabs(sum) : fmax(-sum, 0.0f));
+}
+
+/* Irradiance for a radiance of 1. Below a size of 1/300 of the distance it is that of the middle, within 1e-5. */
+static inline floatv patch_irradiance(const patch_t *p, int two_sided)
+{
+    floatv sum = 0.0f, a[3], e[3];
+    horizon_t h;
+    clear_horizon(&h);
+    for (int i = 0; i < p->corners; i++) {
+        corner(p, i, a, e);
+        above(a, e, &h);
+        sum += edge_sum(a, e);
+    }
+    closing(&h, a, e);
+    sum += edge_sum(a, e);
+    floatv far = 1.0f / fmax(dot3(p->c, p->c), 1e-18f);
+    floatv facing = p->c[0] * (p->u[1] * p->v[2] - p->u[2] * p->v[1]) + p->c[1] * (p->u[2] * p->v[0] - p->u[0] * p->v[2]) +
+                    p->c[2] * (p->u[0] * p->v[1] - p->u[1] * p->v[0]);
+    floatv middle = 8.0f * facing * fmax(p->c[2], 0.0f) * far * far;
+    return sided(rl_select(sum, middle, (dot3(p->u, p->u) + dot3(p->v, p->v)) * far < 1e-5f), two_sided);
+}
+
+/* Of a sphere whose middle is at n.l and which covers sin^2 of its half angle. */
+static inline floatv sphere_irradiance(floatv nl, floatv sine2)
+{
+    floatv c = clamp(nl, -1.0f, 1.0f), s2 = fmax(1.0f - c * c, 1e-12f);
+    floatv x = sqrt(fmax(1.0f / sine2 - 1.0f, 1e-12f)); /* cot of the half angle */
+    floatv y = clamp(-x * c * rsqrt(s2), -1.0f, 1.0f), q = sqrt(s2 * fmax(1.0f - y * y, 0.0f)) / x, q2 = q * q;
+    /* atan q - q, which cancels */
+    floatv series = q * q2 * (-1.0f / 3 + q2 * (1.0f / 5 + q2 * (-1.0f / 7 + q2 * (1.0f / 9 - q2 * (1.0f / 11)))));
+    floatv rest = rl_select(atan(q) - q, series, q < 0.3f);
+    floatv part = fma(sine2, fma(c, acos(y), q), rest);
+    return fmax(rl_select(part, RL_PI * sine2 * fmax(c, 0.0f), c * c > sine2), 0.0f);
+}
+
+/* The lobe's integral over the light, relative to its albedo. Above the surface, then above the cosine's own horizon. */
+static inline floatv patch_reflection(const patch_t *p, const ltc_t *t, int two_sided)
+{
+    floatv sum = 0.0f, a[3], e[3];
+    horizon_t h, inner;
+    clear_horizon(&h);
+    clear_horizon(&inner);
+    for (int i = 0; i <= p->corners; i++) {
+        if (i < p->corners) {
+            corner(p, i, a, e);
+            above(a, e, &h);
+        } else {
+            closing(&h, a, e);
+        }
+        floatv ax = a[0], ex = e[0];
+        a[0] = fma(t->m[0], ax, t->m[1] * a[2]);
+        e[0] = fma(t->m[0], ex, t->m[1] * e[2]);
+        a[2] = fma(t->m[2], ax, t->m[3] * a[2]);
+        e[2] = fma(t->m[2], ex, t->m[3] * e[2]);
+        above(a, e, &inner);
+        sum += edge_sum(a, e);
+    }
+    closing(&inner, a, e);
+    sum += edge_sum(a, e);
+    return sided(sum, two_sided) * t->share * (1.0f / RL_PI);
+}
+
+/* How large the light is for the lobe: half axes over distance, squared, where M^-1 takes it. */
+static inline floatv patch_size(const patch_t *p, const ltc_t *t)
+{
+    floatv sum[3];
+    for (int k = 0; k < 3; k++) {
+        const floatv *v = k == 0 ? p->c : k == 1 ? p->u : p->v;
+        floatv x = fma(t->m[0], v[0], t->m[1] * v[2]), z = fma(t->m[2], v[0], t->m[3] * v[2]);
+        sum[k] = fma(x, x, fma(z, z, v[1] * v[1]));
+    }
+    return (sum[1] + sum[2]) / fmax(sum[0], 1e-18f);
+}
+#endif
