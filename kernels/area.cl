@@ -67,8 +67,9 @@ constant float rect_points[27] = {0, 0, 64, 0.77459667f, 0, 40, -0.77459667f, 0,
 constant float disk_points[21] = {0, 0, 2, 0.81649658f, 0, 1, -0.81649658f, 0, 1, 0.40824829f, 0.70710678f, 1,
                                   -0.40824829f, 0.70710678f, 1, 0.40824829f, -0.70710678f, 1, -0.40824829f, -0.70710678f, 1};
 
-/* Means over the irradiance from those points: of F_in, and of the cosine. Both 1 where none shines. */
-static inline void entry_means(const patch_t *p, int diffuse, int two_sided, floatv *entered, floatv *cosine)
+/* Means over the irradiance from those points on one face: of F_in, and of the cosine; those of a grazing ray where none
+ * shines. */
+static inline void entry_means(const patch_t *p, int diffuse, float face, int two_sided, floatv *entered, floatv *cosine)
 {
     int n = p->corners == RECT_CORNERS ? 9 : 7;
     constant const float *at = n == 9 ? rect_points : disk_points;
@@ -79,7 +80,7 @@ static inline void entry_means(const patch_t *p, int diffuse, int two_sided, flo
         floatv x[3];
         for (int k = 0; k < 3; k++)
             x[k] = fma(at[0], p->u[k], fma(at[1], p->v[k], p->c[k]));
-        floatv inverse = rsqrt(fmax(dot3(x, x), 1e-18f)), c = fmax(x[2] * inverse, 0.0f), from = dot3(x, normal);
+        floatv inverse = rsqrt(fmax(dot3(x, x), 1e-18f)), c = fmax(face * x[2] * inverse, 0.0f), from = dot3(x, normal);
         floatv w = at[2] * c * inverse * inverse * inverse * (two_sided ? fabs(from) : fmax(-from, 0.0f));
         sum += w;
         f = fma(w, transmit(diffuse, c), f);
@@ -128,53 +129,65 @@ static inline void make_cone(cone_t *k, const patch_t *p, constant light_t *ligh
         k->axis[i] = (sum[0] * t->across[i] + sum[1] * t->third[i] + sum[2] * s->n[i]) * sign / fmax(length, 1e-18f);
 }
 
+/* Irradiance on the front, what of the lobe's albedo the light meets, irradiance on the back: for a radiance of 1. One loop, since
+ * programs take long to compile where it is written out. */
+enum { FRONT, LOBE, BACK, FACES };
+static inline void area_sums(const patch_t *p, constant light_t *light, const ray_t *r, const ltc_t *t, int shines,
+                             int transmits, floatv *out)
+{
+    int sphere = light->type == LIGHT_SPHERE, both = sphere || light->two_sided, faces = transmits ? FACES : BACK;
+    for (int i = 0; i < faces; i++) {
+        float face = i == BACK ? -1.0f : 1.0f;
+        floatv m[4] = {1.0f, 0.0f, 0.0f, 1.0f};
+        for (int k = 0; k < 4 && i == LOBE; k++)
+            m[k] = t->m[k];
+        if (i == LOBE ? !shines : sphere) {
+            out[i] = sphere ? sphere_irradiance(face * r->nl, sphere_sine2(light, r)) : (floatv)0.0f;
+            continue;
+        }
+        out[i] = sided(polygon_sum(p, m, face), both);
+        if (i == LOBE)
+            out[i] *= t->share * (1.0f / RL_PI);
+        else
+            out[i] = rl_select(out[i], far_irradiance(p, face, both), patch_size(p, m) < 1e-5f);
+    }
+}
+
 /* Adds what one light sends: E F_in (with what comes through), and the specular radiance. */
 static inline void add_area(constant material_t *m, const surface_t *s, constant light_t *light, ray_t *r, const ltc_t *t,
                             int transmits, int scattered, floatv *diffuse, floatv *specular)
 {
     patch_t p;
-    floatv entered = 1.0f, cosine;
-    int sphere = light->type == LIGHT_SPHERE, both = sphere || light->two_sided;
-    make_patch(&p, light, s, r, t);
-    floatv e = sphere ? sphere_irradiance(r->nl, sphere_sine2(light, r)) : patch_irradiance(&p, both);
-    if (m->shading_diffuse == DISNEY)
-        entry_means(&p, DISNEY, both, &entered, &cosine);
-    floatv front = e * entered * r->visibility, lit = e * r->visibility;
     cone_t k;
+    floatv sum[FACES], entered[2] = {1.0f, 1.0f}, back = 0.0f, through_it[3];
+    int both = light->type == LIGHT_SPHERE || light->two_sided, shines = m->shading_specular == GGX;
+    make_patch(&p, light, s, r, t);
+    area_sums(&p, light, r, t, shines, transmits, sum);
+    for (int i = 0; i < 1 + transmits && (transmits || m->shading_diffuse == DISNEY); i++)
+        entry_means(&p, m->shading_diffuse, i ? -1.0f : 1.0f, both, &entered[i], &back);
     if (scattered)
         make_cone(&k, &p, light, s, r, t);
+    if (transmits)
+        through(m, s, r, back, through_it);
     for (int c = 0; c < 3; c++) {
+        floatv front = sum[FRONT] * entered[0] * r->visibility;
         if (scattered) {
             sg_t sg = sg_make(sg_convolved(k.band1 * sg_band1(s->sharpness[c])));
             front = k.solid * scatter_visibility(s, r) * sg_irradiance(&sg, dot3(s->bent[c], k.axis));
         }
+        if (transmits)
+            front = fma(sum[BACK] * entered[1], through_it[c], front);
         diffuse[c] += light->intensity[c] * light->radiance * front;
     }
-    if (m->shading_specular == GGX && rl_any(lit > 0.0f)) {
-        floatv size = patch_size(&p, t), seen = clamp((size - 1e-3f) * (1.0f / 9e-3f), 0.0f, 1.0f), fresnel;
-        floatv point = lit * lobe(s, r, s->roughness, &fresnel), wide = r->visibility * patch_reflection(&p, t, both);
-        for (int c = 0; c < 3; c++) {
-            floatv f0 = mix(s->specular, s->albedo[c], s->metallic);
-            floatv small = point * fma(1.0f - f0, fresnel, f0);
-            floatv large = wide * fma(f0, t->albedo, (1.0f - f0) * t->fresnel);
-            specular[c] += light->intensity[c] * light->radiance * mix(small, large, seen);
-        }
-    }
-    if (transmits) {
-        floatv back, through_it[3];
-        p.c[2] = -p.c[2];
-        p.u[2] = -p.u[2];
-        p.v[2] = -p.v[2];
-        for (int i = 0; i < 3; i++) { /* a mirrored frame turns the corners round */
-            floatv u = p.u[i];
-            p.u[i] = p.v[i];
-            p.v[i] = u;
-        }
-        e = sphere ? sphere_irradiance(-r->nl, sphere_sine2(light, r)) : patch_irradiance(&p, both);
-        entry_means(&p, m->shading_diffuse, both, &entered, &back);
-        through(m, s, r, back, through_it);
-        for (int c = 0; c < 3; c++)
-            diffuse[c] += light->intensity[c] * light->radiance * e * entered * through_it[c];
+    if (!shines)
+        return;
+    floatv size = patch_size(&p, t->m), seen = clamp((size - 1e-3f) * (1.0f / 9e-3f), 0.0f, 1.0f), fresnel;
+    floatv point = sum[FRONT] * r->visibility * lobe(s, r, s->roughness, &fresnel), wide = sum[LOBE] * r->visibility;
+    for (int c = 0; c < 3; c++) {
+        floatv f0 = mix(s->specular, s->albedo[c], s->metallic);
+        floatv small = point * fma(1.0f - f0, fresnel, f0);
+        floatv large = wide * fma(f0, t->albedo, (1.0f - f0) * t->fresnel);
+        specular[c] += light->intensity[c] * light->radiance * mix(small, large, seen);
     }
 }
 #endif

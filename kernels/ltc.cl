@@ -153,37 +153,50 @@ static inline void edge_vector(const floatv *a, const floatv *e, floatv *out)
         out[i] = normal[i] * g;
 }
 
-static inline floatv edge_sum(const floatv *a, const floatv *e)
-{
-    floatv v[3];
-    edge_vector(a, e, v);
-    return v[2];
-}
-
 /* Corners run clockwise as the surface sees the side that shines. */
 static inline floatv sided(floatv sum, int two_sided)
 {
     return 0.5f * (two_sided ? fabs(sum) : fmax(-sum, 0.0f));
 }
 
-/* Irradiance for a radiance of 1. Below a size of 1/300 of the distance it is that of the middle, within 1e-5. */
-static inline floatv patch_irradiance(const patch_t *p, int two_sided)
+/* Twice the integral of a transformed cosine, times pi, over what is above the surface and above the cosine's own horizon, seen
+ * from the side where z has the sign of `face`. */
+static inline floatv polygon_sum(const patch_t *p, const floatv *m, float face)
 {
-    floatv sum = 0.0f, a[3], e[3];
-    horizon_t h;
+    floatv sum = 0.0f, a[3], e[3], v[3];
+    horizon_t h, inner;
     clear_horizon(&h);
-    for (int i = 0; i < p->corners; i++) {
-        corner(p, i, a, e);
-        above(a, e, &h);
-        sum += edge_sum(a, e);
+    clear_horizon(&inner);
+    for (int i = 0; i < p->corners + 2; i++) {
+        if (i < p->corners) {
+            corner(p, i, a, e);
+            a[2] *= face;
+            e[2] *= face;
+        } else {
+            closing(i == p->corners ? &h : &inner, a, e);
+        }
+        if (i <= p->corners) {
+            above(a, e, &h);
+            floatv ax = a[0], ex = e[0];
+            a[0] = fma(m[0], ax, m[1] * a[2]);
+            e[0] = fma(m[0], ex, m[1] * e[2]);
+            a[2] = fma(m[2], ax, m[3] * a[2]);
+            e[2] = fma(m[2], ex, m[3] * e[2]);
+            above(a, e, &inner);
+        }
+        edge_vector(a, e, v);
+        sum += v[2];
     }
-    closing(&h, a, e);
-    sum += edge_sum(a, e);
-    floatv far = 1.0f / fmax(dot3(p->c, p->c), 1e-18f);
+    return face * sum;
+}
+
+/* Irradiance of a rect for a radiance of 1, from its middle: within 1e-5 of it where half axes are 1/300 of the distance. */
+static inline floatv far_irradiance(const patch_t *p, float face, int two_sided)
+{
+    floatv inverse2 = 1.0f / fmax(dot3(p->c, p->c), 1e-18f);
     floatv facing = p->c[0] * (p->u[1] * p->v[2] - p->u[2] * p->v[1]) + p->c[1] * (p->u[2] * p->v[0] - p->u[0] * p->v[2]) +
                     p->c[2] * (p->u[0] * p->v[1] - p->u[1] * p->v[0]);
-    floatv middle = 8.0f * facing * fmax(p->c[2], 0.0f) * far * far;
-    return sided(rl_select(sum, middle, (dot3(p->u, p->u) + dot3(p->v, p->v)) * far < 1e-5f), two_sided);
+    return sided(8.0f * facing * fmax(face * p->c[2], 0.0f) * inverse2 * inverse2, two_sided);
 }
 
 /* Of a sphere whose middle is at n.l and which covers sin^2 of its half angle. */
@@ -199,40 +212,13 @@ static inline floatv sphere_irradiance(floatv nl, floatv sine2)
     return fmax(rl_select(part, RL_PI * sine2 * fmax(c, 0.0f), c * c > sine2), 0.0f);
 }
 
-/* The lobe's integral over the light, relative to its albedo. Above the surface, then above the cosine's own horizon. */
-static inline floatv patch_reflection(const patch_t *p, const ltc_t *t, int two_sided)
-{
-    floatv sum = 0.0f, a[3], e[3];
-    horizon_t h, inner;
-    clear_horizon(&h);
-    clear_horizon(&inner);
-    for (int i = 0; i <= p->corners; i++) {
-        if (i < p->corners) {
-            corner(p, i, a, e);
-            above(a, e, &h);
-        } else {
-            closing(&h, a, e);
-        }
-        floatv ax = a[0], ex = e[0];
-        a[0] = fma(t->m[0], ax, t->m[1] * a[2]);
-        e[0] = fma(t->m[0], ex, t->m[1] * e[2]);
-        a[2] = fma(t->m[2], ax, t->m[3] * a[2]);
-        e[2] = fma(t->m[2], ex, t->m[3] * e[2]);
-        above(a, e, &inner);
-        sum += edge_sum(a, e);
-    }
-    closing(&inner, a, e);
-    sum += edge_sum(a, e);
-    return sided(sum, two_sided) * t->share * (1.0f / RL_PI);
-}
-
-/* How large the light is for the lobe: half axes over distance, squared, where M^-1 takes it. */
-static inline floatv patch_size(const patch_t *p, const ltc_t *t)
+/* Half axes over distance, squared, where a matrix takes the light: how large it is for a lobe. */
+static inline floatv patch_size(const patch_t *p, const floatv *m)
 {
     floatv sum[3];
     for (int k = 0; k < 3; k++) {
         const floatv *v = k == 0 ? p->c : k == 1 ? p->u : p->v;
-        floatv x = fma(t->m[0], v[0], t->m[1] * v[2]), z = fma(t->m[2], v[0], t->m[3] * v[2]);
+        floatv x = fma(m[0], v[0], m[1] * v[2]), z = fma(m[2], v[0], m[3] * v[2]);
         sum[k] = fma(x, x, fma(z, z, v[1] * v[1]));
     }
     return (sum[1] + sum[2]) / fmax(sum[0], 1e-18f);
