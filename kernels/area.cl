@@ -106,7 +106,8 @@ static inline floatv triangle_solid(const floatv *a, const floatv *b, const floa
 static inline void make_cone(cone_t *k, const patch_t *p, constant light_t *light, const surface_t *s, const ray_t *r,
                              const ltc_t *t)
 {
-    floatv sum[3] = {0.0f, 0.0f, 0.0f}, a[4][3], e[3], part[3];
+    floatv sum[3] = {0.0f, 0.0f, 0.0f}, part[3];
+    edge_t e[4];
     if (light->type == LIGHT_SPHERE) {
         floatv cosine = sqrt(1.0f - sphere_sine2(light, r));
         k->band1 = 0.5f * (1.0f + cosine);
@@ -116,12 +117,12 @@ static inline void make_cone(cone_t *k, const patch_t *p, constant light_t *ligh
         return;
     }
     for (int i = 0; i < 4; i++) {
-        corner(p, i, a[i], e);
-        edge_vector(a[i], e, part);
+        corner_edge(p, i, 1.0f, &e[i]);
+        edge_vector(&e[i], part);
         for (int c = 0; c < 3; c++)
             sum[c] -= 0.5f * part[c];
     }
-    floatv solid = -(triangle_solid(a[0], a[1], a[2]) + triangle_solid(a[0], a[2], a[3]));
+    floatv solid = -(triangle_solid(e[0].a, e[1].a, e[2].a) + triangle_solid(e[0].a, e[2].a, e[3].a));
     floatv length = sqrt(dot3(sum, sum)), sign = light->two_sided ? copysign((floatv)1.0f, solid) : (floatv)1.0f;
     k->solid = fmax(solid * sign, 0.0f);
     k->band1 = clamp(length / fmax(k->solid, 1e-18f), 0.0f, 0.99995f);

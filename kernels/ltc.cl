@@ -79,12 +79,20 @@ constant float disk_corner[2 * (DISK_CORNERS + 1)] = {
     -DISK_C, DISK_C,  -DISK_B, DISK_D,  -DISK_A, 0,       -DISK_B, -DISK_D, -DISK_C, -DISK_C, -DISK_D, -DISK_B,
     0,       -DISK_A, DISK_D,  -DISK_B, DISK_C,  -DISK_C, DISK_B,  -DISK_D, DISK_A,  0};
 
-static inline void corner(const patch_t *p, int i, floatv *a, floatv *e)
+/* An edge: both ends and what is between them, which would cancel in their difference. An end is computed as the next edge's
+ * beginning is, so that both are the same bits and fall on the same side of a plane. */
+typedef struct edge_t {
+    floatv a[3], b[3], run[3];
+} edge_t;
+
+static inline void corner_edge(const patch_t *p, int i, float face, edge_t *e)
 {
     constant const float *at = (p->corners == RECT_CORNERS ? rect_corner : disk_corner) + 2 * i;
     for (int k = 0; k < 3; k++) {
-        a[k] = fma(at[0], p->u[k], fma(at[1], p->v[k], p->c[k]));
-        e[k] = fma(at[2] - at[0], p->u[k], (at[3] - at[1]) * p->v[k]);
+        float sign = k == 2 ? face : 1.0f;
+        e->a[k] = sign * fma(at[0], p->u[k], fma(at[1], p->v[k], p->c[k]));
+        e->b[k] = sign * fma(at[2], p->u[k], fma(at[3], p->v[k], p->c[k]));
+        e->run[k] = sign * fma(at[2] - at[0], p->u[k], (at[3] - at[1]) * p->v[k]);
     }
 }
 
@@ -99,29 +107,39 @@ static inline void clear_horizon(horizon_t *h)
         h->down[i] = h->up[i] = 0.0f;
 }
 
-/* Leaves of the edge from a to a + e what is above z = 0. */
-static inline void above(floatv *a, floatv *e, horizon_t *h)
+/* Leaves of an edge what is above z = 0. */
+static inline void above(edge_t *e, horizon_t *h)
 {
-    floatv first = a[2], last = a[2] + e[2], run = first - last;
-    intv out = first < 0.0f, end = last < 0.0f;
-    floatv at = clamp(first / rl_select(run, 1.0f, fabs(run) < 1e-30f), 0.0f, 1.0f);
-    floatv from = rl_select(0.0f, at, out), to = rl_select(1.0f, at, end);
+    intv out = e->a[2] < 0.0f, end = e->b[2] < 0.0f, crosses = out ^ end;
+    floatv at = clamp(e->a[2] / rl_select(1.0f, e->a[2] - e->b[2], crosses), 0.0f, 1.0f);
+    floatv part = rl_select(rl_select(1.0f, 0.0f, out & end), rl_select(at, 1.0f - at, out), crosses);
     for (int i = 0; i < 3; i++) {
-        floatv start = fma(from, e[i], a[i]);
-        h->up[i] = rl_select(h->up[i], i == 2 ? (floatv)0.0f : start, out & ~end);
-        h->down[i] = rl_select(h->down[i], i == 2 ? (floatv)0.0f : fma(to, e[i], a[i]), ~out & end);
-        a[i] = start;
-        e[i] *= to - from;
+        floatv place = i == 2 ? (floatv)0.0f : fma(at, e->run[i], e->a[i]);
+        h->up[i] = rl_select(h->up[i], place, crosses & out);
+        h->down[i] = rl_select(h->down[i], place, crosses & end);
+        e->a[i] = rl_select(e->a[i], place, crosses & out);
+        e->b[i] = rl_select(e->b[i], place, crosses & end);
+        e->run[i] *= part;
     }
 }
 
-/* The edge that closes it along the horizon; none where nothing crossed. */
-static inline void closing(const horizon_t *h, floatv *a, floatv *e)
+/* The edge that closes it along the horizon; without length where nothing crossed. */
+static inline void closing(const horizon_t *h, edge_t *e)
 {
+    intv crossed = (dot3(h->down, h->down) > 0.0f) & (dot3(h->up, h->up) > 0.0f);
     for (int i = 0; i < 3; i++) {
-        a[i] = h->down[i];
-        e[i] = h->up[i] - h->down[i];
+        e->a[i] = h->down[i];
+        e->b[i] = h->up[i];
+        e->run[i] = rl_select(0.0f, h->up[i] - h->down[i], crossed);
     }
+}
+
+/* M^-1 = (m0 0 m1; 0 1 0; m2 0 m3) */
+static inline void bend(const floatv *m, floatv *v)
+{
+    floatv x = v[0];
+    v[0] = fma(m[0], x, m[1] * v[2]);
+    v[2] = fma(m[2], x, m[3] * v[2]);
 }
 
 /* acos(x) / sqrt(1 - x^2) for x = cos of an angle whose sine is given; relative error 1e-6. */
@@ -138,17 +156,14 @@ static inline floatv angle_over_sine(floatv x, floatv sine)
     return rl_select(p, RL_PI / fmax(sine, 1e-6f) - p, x < 0.0f);
 }
 
-/* An edge's part of twice the polygon's vector irradiance: its angle along the normal of its plane through the origin. a x b is
- * a x e, which does not cancel. */
-static inline void edge_vector(const floatv *a, const floatv *e, floatv *out)
+/* An edge's part of twice the polygon's vector irradiance: its angle along the normal of its plane through the origin. */
+static inline void edge_vector(const edge_t *e, floatv *out)
 {
-    floatv b[3], normal[3];
-    for (int i = 0; i < 3; i++) {
-        b[i] = a[i] + e[i];
-        normal[i] = a[(i + 1) % 3] * e[(i + 2) % 3] - a[(i + 2) % 3] * e[(i + 1) % 3];
-    }
-    floatv inverse = rsqrt(fmax(dot3(a, a), 1e-18f)) * rsqrt(fmax(dot3(b, b), 1e-18f));
-    floatv g = angle_over_sine(dot3(a, b) * inverse, sqrt(dot3(normal, normal)) * inverse) * inverse;
+    floatv normal[3];
+    for (int i = 0; i < 3; i++)
+        normal[i] = e->a[(i + 1) % 3] * e->run[(i + 2) % 3] - e->a[(i + 2) % 3] * e->run[(i + 1) % 3];
+    floatv inverse = rsqrt(fmax(dot3(e->a, e->a), 1e-18f)) * rsqrt(fmax(dot3(e->b, e->b), 1e-18f));
+    floatv g = angle_over_sine(dot3(e->a, e->b) * inverse, sqrt(dot3(normal, normal)) * inverse) * inverse;
     for (int i = 0; i < 3; i++)
         out[i] = normal[i] * g;
 }
@@ -163,28 +178,25 @@ static inline floatv sided(floatv sum, int two_sided)
  * from the side where z has the sign of `face`. */
 static inline floatv polygon_sum(const patch_t *p, const floatv *m, float face)
 {
-    floatv sum = 0.0f, a[3], e[3], v[3];
+    floatv sum = 0.0f, v[3];
+    edge_t e;
     horizon_t h, inner;
     clear_horizon(&h);
     clear_horizon(&inner);
     for (int i = 0; i < p->corners + 2; i++) {
         if (i < p->corners) {
-            corner(p, i, a, e);
-            a[2] *= face;
-            e[2] *= face;
+            corner_edge(p, i, face, &e);
+            above(&e, &h);
         } else {
-            closing(i == p->corners ? &h : &inner, a, e);
+            closing(i == p->corners ? &h : &inner, &e);
         }
         if (i <= p->corners) {
-            above(a, e, &h);
-            floatv ax = a[0], ex = e[0];
-            a[0] = fma(m[0], ax, m[1] * a[2]);
-            e[0] = fma(m[0], ex, m[1] * e[2]);
-            a[2] = fma(m[2], ax, m[3] * a[2]);
-            e[2] = fma(m[2], ex, m[3] * e[2]);
-            above(a, e, &inner);
+            bend(m, e.a);
+            bend(m, e.b);
+            bend(m, e.run);
+            above(&e, &inner);
         }
-        edge_vector(a, e, v);
+        edge_vector(&e, v);
         sum += v[2];
     }
     return face * sum;
@@ -217,9 +229,11 @@ static inline floatv patch_size(const patch_t *p, const floatv *m)
 {
     floatv sum[3];
     for (int k = 0; k < 3; k++) {
-        const floatv *v = k == 0 ? p->c : k == 1 ? p->u : p->v;
-        floatv x = fma(m[0], v[0], m[1] * v[2]), z = fma(m[2], v[0], m[3] * v[2]);
-        sum[k] = fma(x, x, fma(z, z, v[1] * v[1]));
+        floatv v[3];
+        for (int i = 0; i < 3; i++)
+            v[i] = k == 0 ? p->c[i] : k == 1 ? p->u[i] : p->v[i];
+        bend(m, v);
+        sum[k] = dot3(v, v);
     }
     return (sum[1] + sum[2]) / fmax(sum[0], 1e-18f);
 }

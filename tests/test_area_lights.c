@@ -193,6 +193,7 @@ static void make_yard(yard *t)
     fill(t, LIGHTING_METALLIC, 0);
     fill(t, LIGHTING_SPECULAR, 0.04f);
     fill(t, LIGHTING_DEPTH, 1);
+    t->scene.frame.camera.focal[0] = t->scene.frame.camera.focal[1] = 100; /* 10 x 12 cm are seen */
     for (int y = f->valid[1]; y < f->valid[3]; y++)
         for (int x = f->valid[0]; x < f->valid[2]; x++) {
             shade_set_id(&t->scene.images[LIGHTING_STENCIL], f, x, y, MATERIAL);
