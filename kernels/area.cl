@@ -130,28 +130,56 @@ static inline void make_cone(cone_t *k, const patch_t *p, constant light_t *ligh
         k->axis[i] = (sum[0] * t->across[i] + sum[1] * t->third[i] + sum[2] * s->n[i]) * sign / fmax(length, 1e-18f);
 }
 
-/* Irradiance on the front, what of the lobe's albedo the light meets, irradiance on the back: for a radiance of 1. One loop, since
- * programs take long to compile where it is written out. */
+/* (1 - v.h)^5 for the middle of what the light meets of the lobe, a direction under the transformed cosine. */
+static inline floatv middle_fresnel(const floatv *bent, const surface_t *s, const ltc_t *t)
+{
+    const floatv *m = t->m;
+    floatv inverse = 1.0f / (m[0] * m[3] - m[1] * m[2]);
+    floatv l[3] = {(m[3] * bent[0] - m[1] * bent[2]) * inverse, bent[1], (m[0] * bent[2] - m[2] * bent[0]) * inverse};
+    floatv vl = (dot3(s->v, t->across) * l[0] + s->nv * l[2]) * rsqrt(fmax(dot3(l, l), 1e-18f));
+    floatv f = 1.0f - sqrt(clamp(fma(0.5f, vl, 0.5f), 0.0f, 1.0f)), f2 = f * f; /* v.h = cos of half the angle */
+    return f2 * f2 * f;
+}
+
+/* Irradiance on the front, what of the lobe's albedo the light meets, irradiance on the back: for a radiance of 1; and the
+ * Fresnel factor of that part of the lobe. One loop, since programs take long to compile where it is written out. */
 enum { FRONT, LOBE, BACK, FACES };
-static inline void area_sums(const patch_t *p, constant light_t *light, const ray_t *r, const ltc_t *t, int shines,
-                             int transmits, floatv *out)
+static inline floatv area_sums(const patch_t *p, const surface_t *s, constant light_t *light, const ray_t *r, const ltc_t *t,
+                               int shines, int transmits, floatv *out)
 {
     int sphere = light->type == LIGHT_SPHERE, both = sphere || light->two_sided, faces = transmits ? FACES : BACK;
+    floatv fresnel = 0.0f;
     for (int i = 0; i < faces; i++) {
         float face = i == BACK ? -1.0f : 1.0f;
-        floatv m[4] = {1.0f, 0.0f, 0.0f, 1.0f};
+        floatv m[4] = {1.0f, 0.0f, 0.0f, 1.0f}, sum[3];
         for (int k = 0; k < 4 && i == LOBE; k++)
             m[k] = t->m[k];
         if (i == LOBE ? !shines : sphere) {
             out[i] = sphere ? sphere_irradiance(face * r->nl, sphere_sine2(light, r)) : (floatv)0.0f;
             continue;
         }
-        out[i] = sided(polygon_sum(p, m, face), both);
-        if (i == LOBE)
-            out[i] *= t->share * (1.0f / RL_PI);
-        else
+        polygon_sum(p, m, face, sum);
+        out[i] = sided(sum[2], both);
+        if (i == LOBE) {
+            floatv sign = copysign((floatv)1.0f, sum[2]), met = clamp(out[i] * t->share * (1.0f / RL_PI), 0.0f, 1.0f);
+            for (int k = 0; k < 3; k++)
+                sum[k] *= sign;
+            fresnel = mix(middle_fresnel(sum, s, t), t->fresnel / t->albedo, met * met);
+            out[i] = met;
+        } else {
             out[i] = rl_select(out[i], far_irradiance(p, face, both), patch_size(p, m) < 1e-5f);
+        }
     }
+    return fresnel;
+}
+
+/* Solid angle of a light that is far for its size. */
+static inline floatv small_solid(const patch_t *p)
+{
+    floatv facing = 0.0f, inverse = rsqrt(fmax(dot3(p->c, p->c), 1e-18f));
+    for (int i = 0; i < 3; i++)
+        facing += p->c[i] * (p->u[(i + 1) % 3] * p->v[(i + 2) % 3] - p->u[(i + 2) % 3] * p->v[(i + 1) % 3]);
+    return (p->corners == RECT_CORNERS ? 4.0f : RL_PI) * fabs(facing) * inverse * inverse * inverse;
 }
 
 /* Adds what one light sends: E F_in (with what comes through), and the specular radiance. */
@@ -163,7 +191,7 @@ static inline void add_area(constant material_t *m, const surface_t *s, constant
     floatv sum[FACES], entered[2] = {1.0f, 1.0f}, back = 0.0f, through_it[3];
     int both = light->type == LIGHT_SPHERE || light->two_sided, shines = m->shading_specular == GGX;
     make_patch(&p, light, s, r, t);
-    area_sums(&p, light, r, t, shines, transmits, sum);
+    floatv wide_fresnel = area_sums(&p, s, light, r, t, shines, transmits, sum);
     for (int i = 0; i < 1 + transmits && (transmits || m->shading_diffuse == DISNEY); i++)
         entry_means(&p, m->shading_diffuse, i ? -1.0f : 1.0f, both, &entered[i], &back);
     if (scattered)
@@ -183,11 +211,13 @@ static inline void add_area(constant material_t *m, const surface_t *s, constant
     if (!shines)
         return;
     floatv size = patch_size(&p, t->m), seen = clamp((size - 1e-3f) * (1.0f / 9e-3f), 0.0f, 1.0f), fresnel;
-    floatv point = sum[FRONT] * r->visibility * lobe(s, r, s->roughness, &fresnel), wide = sum[LOBE] * r->visibility;
+    ray_t middle = *r; /* of what is above the horizon: the lobe goes as 1/n.l there */
+    middle.nl = fmax(r->nl, sum[FRONT] / fmax(small_solid(&p), 1e-30f));
+    floatv point = sum[FRONT] * r->visibility * lobe(s, &middle, s->roughness, &fresnel), wide = sum[LOBE] * t->albedo * r->visibility;
     for (int c = 0; c < 3; c++) {
         floatv f0 = mix(s->specular, s->albedo[c], s->metallic);
         floatv small = point * fma(1.0f - f0, fresnel, f0);
-        floatv large = wide * fma(f0, t->albedo, (1.0f - f0) * t->fresnel);
+        floatv large = wide * fma(1.0f - f0, wide_fresnel, f0);
         specular[c] += light->intensity[c] * light->radiance * mix(small, large, seen);
     }
 }

@@ -107,7 +107,7 @@ static inline void clear_horizon(horizon_t *h)
         h->down[i] = h->up[i] = 0.0f;
 }
 
-/* Leaves of an edge what is above z = 0. */
+/* Leaves of an edge what is above z = 0; of one below a point, which crosses nothing else. */
 static inline void above(edge_t *e, horizon_t *h)
 {
     intv out = e->a[2] < 0.0f, end = e->b[2] < 0.0f, crosses = out ^ end;
@@ -118,7 +118,7 @@ static inline void above(edge_t *e, horizon_t *h)
         h->up[i] = rl_select(h->up[i], place, crosses & out);
         h->down[i] = rl_select(h->down[i], place, crosses & end);
         e->a[i] = rl_select(e->a[i], place, crosses & out);
-        e->b[i] = rl_select(e->b[i], place, crosses & end);
+        e->b[i] = rl_select(rl_select(e->b[i], place, crosses & end), e->a[i], out & end);
         e->run[i] *= part;
     }
 }
@@ -174,15 +174,16 @@ static inline floatv sided(floatv sum, int two_sided)
     return 0.5f * (two_sided ? fabs(sum) : fmax(-sum, 0.0f));
 }
 
-/* Twice the integral of a transformed cosine, times pi, over what is above the surface and above the cosine's own horizon, seen
- * from the side where z has the sign of `face`. */
-static inline floatv polygon_sum(const patch_t *p, const floatv *m, float face)
+/* Twice the vector irradiance under a transformed cosine of what is above the surface and above the cosine's own horizon, seen
+ * from the side where z has the sign of `face`; its z is twice pi times the cosine's integral. */
+static inline void polygon_sum(const patch_t *p, const floatv *m, float face, floatv *sum)
 {
-    floatv sum = 0.0f, v[3];
+    floatv v[3];
     edge_t e;
     horizon_t h, inner;
     clear_horizon(&h);
     clear_horizon(&inner);
+    sum[0] = sum[1] = sum[2] = 0.0f;
     for (int i = 0; i < p->corners + 2; i++) {
         if (i < p->corners) {
             corner_edge(p, i, face, &e);
@@ -197,9 +198,9 @@ static inline floatv polygon_sum(const patch_t *p, const floatv *m, float face)
             above(&e, &inner);
         }
         edge_vector(&e, v);
-        sum += v[2];
+        for (int k = 0; k < 3; k++)
+            sum[k] = fma(face, v[k], sum[k]);
     }
-    return face * sum;
 }
 
 /* Irradiance of a rect for a radiance of 1, from its middle: within 1e-5 of it where half axes are 1/300 of the distance. */
