@@ -58,12 +58,13 @@ static inline void sky_at(constant ambient_t *a, global const float *sky, const 
         out[k] = rl_vload(0, c[k]);
 }
 
-/* Karis 2013: the mean radiance around the mirror direction times the lobe's albedo. */
+/* Karis 2013: the mean radiance around the lobe's direction times its albedo. The direction is that of the transformed cosine,
+ * which leaves the mirror's where surfaces are rough. Errors: tests/test_sky.c. */
 static inline void add_sky(const surface_t *s, constant ambient_t *a, global const float *sky, const ltc_t *t, floatv *specular)
 {
-    floatv r[3], light[3], nv = dot3(s->n, s->v);
+    floatv r[3], light[3], inverse = rsqrt(fma(t->m[0], t->m[0], t->m[1] * t->m[1]));
     for (int i = 0; i < 3; i++)
-        r[i] = fma(2.0f * nv, s->n[i], -s->v[i]);
+        r[i] = fma(t->m[0], s->n[i], -t->m[1] * t->across[i]) * inverse;
     sky_at(a, sky, r, s->roughness, light);
     for (int c = 0; c < 3; c++) {
         floatv f0 = mix(s->specular, s->albedo[c], s->metallic);

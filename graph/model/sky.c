@@ -166,8 +166,9 @@ static void halve(const image *from, const image *to)
 /* ---- the lobe --------------------------------------------------------------------------------------------
  */
 
-/* Directions of GGX's normals as seen from along the axis, mirrored, weighted with the cosine; the mip level
- * is that whose pixels cover the share of a sample. */
+/* Directions of GGX's normals as seen from along the axis, mirrored, weighted with the cosine and the
+ * height-correlated Smith term: the lobe at normal incidence. The mip level is that whose pixels cover the
+ * share of a sample. */
 static void make_samples(job *j, double roughness, int wanted)
 {
     double alpha2 = pow(roughness, 4), all = 0, pixels = 4 * pi / ((double)j->from[0].side * j->from[0].side);
@@ -178,10 +179,11 @@ static void make_samples(job *j, double roughness, int wanted)
         if (z <= 0) /* below the surface */
             continue;
         double across = 2 * sqrt(fmax(c2 * (1 - c2), 0)), density = alpha2 / (4 * pi * h * h);
+        double weight = z / (z + sqrt(z * z * (1 - alpha2) + alpha2));
         sample *s = &j->samples[j->n++];
-        *s = (sample){{(float)(across * cos(turn)), (float)(across * sin(turn)), (float)z}, (float)z, 0};
+        *s = (sample){{(float)(across * cos(turn)), (float)(across * sin(turn)), (float)z}, (float)weight, 0};
         s->mip = (float)fmin(fmax(0.5 * log2(1 / (wanted * density) / pixels) + 0.5, 0), j->mips - 1.001);
-        all += z;
+        all += weight;
     }
     for (int i = 0; i < j->n; i++)
         j->samples[i].weight = (float)((double)j->samples[i].weight / all);
