@@ -110,6 +110,13 @@ static rl_code lighting_tables(const rl_pass_input *in, rl_arena *arena, rl_tabl
 
 static const rl_step steps[] = {{"lighting", .domain = RL_EVERY_VECTOR}};
 
+/* With three lights; how many there are is not known here. */
+static double cost(const void *p)
+{
+    (void)p;
+    return 26;
+}
+
 const rl_pass rl_pass_lighting = {
     .name = "lighting",
     .help = "direct and ambient light: diffuse transmission, specular reflection, translucency",
@@ -127,4 +134,5 @@ const rl_pass rl_pass_lighting = {
     .ambient = true,
     .light_tables = true,
     .tables = lighting_tables,
+    .cost = cost,
 };

@@ -91,6 +91,13 @@ static rl_code tables(const rl_pass_input *in, rl_arena *arena, rl_tables *out, 
     return RL_OK;
 }
 
+/* Of a picture that is about half skin. */
+static double cost(const void *of)
+{
+    const sss_burley_params *p = of;
+    return 45 + 2.0 * (p->taps > 0 ? p->taps : 30);
+}
+
 const rl_pass rl_pass_sss_burley = {
     .name = "sss_burley",
     .help = "subsurface scattering with Burley's profile, a few importance-sampled taps a pixel",
@@ -104,4 +111,5 @@ const rl_pass rl_pass_sss_burley = {
     .ports = RL_ARRAY(ports),
     .steps = RL_ARRAY(steps),
     .tables = tables,
+    .cost = cost,
 };

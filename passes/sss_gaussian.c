@@ -65,6 +65,12 @@ static const rl_step steps[] = {
     {"sss_gaussian_resolve", .domain = RL_EVERY_VECTOR},
 };
 
+/* Follows the size of the profile in pixels, which is not known here: of skin, 3 mm at 2 px a mm. */
+static double cost(const void *of)
+{
+    return ((const sss_gaussian_params *)of)->separable ? 500 : 16000;
+}
+
 const rl_pass rl_pass_sss_gaussian = {
     .name = "sss_gaussian",
     .help = "subsurface scattering with a mixture of Gaussians",
@@ -77,4 +83,5 @@ const rl_pass rl_pass_sss_gaussian = {
     .shading_keys = RL_ARRAY(shading_keys),
     .ports = RL_ARRAY(ports),
     .steps = RL_ARRAY(steps),
+    .cost = cost,
 };

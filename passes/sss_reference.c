@@ -36,6 +36,13 @@ static const rl_step steps[] = {
     {"sss_reference_resolve", .domain = RL_EVERY_VECTOR},
 };
 
+/* Follows the square of the profile's size in pixels: of skin, 3 mm at 2 px a mm. */
+static double cost(const void *of)
+{
+    (void)of;
+    return 50000;
+}
+
 const rl_pass rl_pass_sss_reference = {
     .name = "sss_reference",
     .help = "subsurface scattering with Burley's profile, summed over every pixel in reach",
@@ -48,4 +55,5 @@ const rl_pass rl_pass_sss_reference = {
     .shading_keys = RL_ARRAY(rl_scatter_shading_rows),
     .ports = RL_ARRAY(ports),
     .steps = RL_ARRAY(steps),
+    .cost = cost,
 };

@@ -43,6 +43,12 @@ static double least_share(const void *values)
     return (double)((const taa_params *)values)->blend;
 }
 
+static double cost(const void *of)
+{
+    (void)of;
+    return 32;
+}
+
 const rl_pass rl_pass_taa = {
     .name = "taa",
     .help = "temporal anti-aliasing with variance clipping",
@@ -58,4 +64,5 @@ const rl_pass rl_pass_taa = {
         "where history is neither clipped, nor resampled, nor a firefly; elsewhere it lies in the colour box "
         "of "
         "the pixel's 3x3 neighbours whatever came before, so that no two runs differ by more than that box",
+    .cost = cost,
 };

@@ -10,10 +10,12 @@
 #include <string.h>
 
 #include "graph/base/alloc.h"
+#include "graph/model/materials.h"
 #include "graph/model/params.h"
 #include "graph/run/device.h"
 #include "graph/run/kernel_source.h"
 #include "kernels/shared.h"
+#include "tests/tool_run.h"
 
 static int word_count(const char *words)
 {
@@ -57,6 +59,22 @@ static void form_init(form *f, const rl_pass *pass)
     f->plan = (rl_plan){.graph = &f->graph, .buffers = f->buffer, .n_buffers = pass->ports.n};
 }
 
+/* The program's text with a material that has the rows of this pass alone. */
+static char *own_materials(const rl_pass *pass, const char *text)
+{
+    const rl_pass *const one[] = {pass};
+    const rl_registry registry = {one, 1};
+    rl_str all = {0}, own = {0};
+    rl_materials_struct_text(&all);
+    rl_materials_struct_text_from(&registry, &own);
+    char *replaced = text_replace(text, rl_str_text(&all), rl_str_text(&own));
+    rl_str_free(&all);
+    rl_str_free(&own);
+    return replaced;
+}
+
+/* What a kernel reads of the materials it must declare: a merged graph (graph_merge.h) tells by that which
+ * nodes are equal. */
 static rl_program *form_build(const form *f, const char *what)
 {
     rl_arena arena = {0};
@@ -64,9 +82,11 @@ static rl_program *form_build(const form *f, const char *what)
     rl_error err = {0};
     rl_program *program = NULL;
     rl_plan_node node = {.node = 0, .buffers = f->buffers};
-    if (rl_kernel_text(&arena, &f->plan, &node, RL_LIGHTS_ALL, &text, &err) ||
-        rl_program_build(device, f->pass->name, rl_str_text(&text), true, &program, &err))
+    rl_code code = rl_kernel_text(&arena, &f->plan, &node, RL_LIGHTS_ALL, &text, &err);
+    char *own = code ? NULL : own_materials(f->pass, rl_str_text(&text));
+    if (code || rl_program_build(device, f->pass->name, own, true, &program, &err))
         fail_msg("%s (%s): %s:%d:%d: %s", f->pass->name, what, err.file, err.line, err.column, err.text);
+    free(own);
     rl_str_free(&text);
     rl_arena_free(&arena);
     built++;

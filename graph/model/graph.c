@@ -162,7 +162,11 @@ static rl_code add_node(rl_graph_builder *b, const rl_node *node)
         return rl_fail_memory(b->err, n_ports * sizeof *bound);
     int index = (int)b->n_nodes++;
     b->bound[index] = bound;
-    b->nodes[index] = (rl_graph_node){node->name, node->where, node->pass, node->params, bound};
+    b->nodes[index] = (rl_graph_node){.name = node->name,
+                                      .where = node->where,
+                                      .pass = node->pass,
+                                      .params = node->params,
+                                      .images = bound};
     for (size_t p = 0; p < n_ports && code == RL_OK; p++) {
         const rl_port *port = &node->pass->ports.rows[p];
         bound[p] = -1;

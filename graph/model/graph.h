@@ -35,6 +35,8 @@ typedef struct rl_graph_node {
     const void *params;
     const int *images; /* a port: the image that it reads or writes, or whose past it reads; -1: absent, or
                           scratch */
+    int scene; /* whose materials, lights and ambient light it reads: 0, or of a merged graph's variant
+                  (graph_merge.h) */
 } rl_graph_node;
 
 typedef struct rl_graph_output {

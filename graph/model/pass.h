@@ -245,6 +245,9 @@ typedef struct rl_pass {
      * holds elsewhere. */
     double (*least_share)(const void *params);
     const char *fades_where;
+    /* What the arithmetic of a pixel costs, as so many reads or writes of a plane: a rough figure from `relit
+     * bench`, for predictions. NULL: next to nothing. `params` is the pass's struct. */
+    double (*cost)(const void *params);
 } rl_pass;
 
 /* The struct holds the table's 4-byte fields and nothing else; RGB rows count three. */

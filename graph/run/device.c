@@ -55,6 +55,7 @@ struct rl_program {
     } kernels[MOST_KERNELS];
     size_t n_kernels;
     bool from_source;
+    int users; /* rl_program_share's included */
     uint64_t key[2];
 };
 
@@ -517,6 +518,7 @@ rl_code rl_program_build(rl_device *device, const char *name, const char *text, 
         return rl_fail_memory(err, sizeof *p);
     }
     p->device = device;
+    p->users = 1;
     const char *const parts[] = {text, BUILD_OPTIONS, device->info.name, device->info.version,
                                  device->info.driver};
     rl_program_cache_key(parts, sizeof parts / sizeof *parts, p->key);
@@ -543,11 +545,18 @@ static void save_binary(rl_program *p)
     rl_free(binary);
 }
 
+rl_program *rl_program_share(rl_program *program)
+{
+    if (program)
+        program->users++;
+    return program;
+}
+
 void rl_program_free(rl_program **program)
 {
     rl_program *p = *program;
     *program = NULL;
-    if (!p)
+    if (!p || --p->users > 0)
         return;
     /* Only now does a PoCL binary hold the machine code of the sizes that were run. */
     if (p->program && p->from_source && p->n_kernels > 0)

@@ -3,9 +3,7 @@
 #include <string.h>
 
 #include "graph/base/alloc.h"
-#include "graph/base/pool.h"
 #include "graph/run/executor_parts.h"
-#include "graph/run/kernel_source.h"
 
 /* Kernels address images from pixel (0, 0) on; the guard in front can be read. */
 #define GUARD_BYTES (RL_GUARD * sizeof(float))
@@ -45,7 +43,8 @@ static rl_code make_constants(rl_executor *x, int node, rl_error *err)
         code = upload(x, g->params, g->pass->params_size, &n->params, err);
     if (!code && g->pass->tables) {
         rl_tables t = {0};
-        rl_pass_input in = {.pass = g->pass, .params = g->params, .materials = x->material_table};
+        rl_pass_input in = {
+            .pass = g->pass, .params = g->params, .materials = x->scenes[g->scene].scene.materials};
         code = g->pass->tables(&in, &x->arena, &t, err);
         if (!code)
             code = upload(x, t.data, t.n * sizeof *t.data, &n->tables, err);
@@ -53,60 +52,26 @@ static rl_code make_constants(rl_executor *x, int node, rl_error *err)
     return code;
 }
 
-/* Programs are built by several threads; each has its own arena, text and error. */
-typedef struct build_job {
-    rl_executor *x;
-    rl_error *errors; /* one a program: live nodes, then the conversions */
-} build_job;
-
-static void build_one(void *ctx, int i)
+static rl_code upload_scenes(rl_executor *x, rl_error *err)
 {
-    build_job *job = ctx;
-    rl_executor *x = job->x;
-    rl_error *err = &job->errors[i];
-    rl_arena arena = {0};
-    rl_str text = {0};
-    if ((size_t)i < x->plan->n_nodes) {
-        const rl_plan_node *n = &x->plan->nodes[i];
-        const rl_graph_node *g = &x->plan->graph->nodes[n->node];
-        if (!rl_kernel_text(&arena, x->plan, n, x->kinds, &text, err))
-            rl_program_build(x->device, g->name, rl_str_text(&text), false, &x->nodes[n->node].program, err);
-        if (err->code == RL_E_BUILD && !err->file[0])
-            rl_fail(err, RL_E_BUILD, g->where, "pass '%s' (%s) does not build", g->name, g->pass->name);
-    } else if (!rl_kernel_convert_text(&arena, &text, err)) {
-        rl_program_build(x->device, "convert", rl_str_text(&text), true, &x->convert, err);
-    }
-    rl_str_free(&text);
-    rl_arena_free(&arena);
-}
-
-static rl_code build_programs(rl_executor *x, int threads, rl_error *err)
-{
-    int n = (int)x->plan->n_nodes;
-    bool converts = false;
-    for (size_t i = 0; i < x->plan->n_steps; i++)
-        converts |= x->plan->steps[i].kind == RL_STEP_CONVERT;
-    n += converts;
-    build_job job = {x, rl_arena_array(&x->arena, (size_t)n + 1, sizeof *job.errors)};
-    rl_pool *pool = NULL;
-    if (!job.errors)
-        return rl_fail_memory(err, (size_t)n * sizeof *job.errors);
-    rl_code code = rl_pool_new(threads < n ? threads : n, &pool, err);
-    if (code)
-        return code;
-    rl_pool_for(pool, n, build_one, &job);
-    rl_pool_free(&pool);
-    for (int i = 0; i < n && !code; i++) {
-        code = job.errors[i].code;
-        if (code && err)
-            *err = job.errors[i];
+    rl_code code = RL_OK;
+    for (size_t i = 0; i < x->n_scenes && !code; i++) {
+        rl_scene_state *s = &x->scenes[i];
+        const rl_materials *m = s->scene.materials;
+        code = upload(x, m->data, m->count * m->entry_bytes, &s->materials, err);
+        const rl_light_setup *l = &s->scene.lights;
+        if (!code && l->n_profiles)
+            code = upload(x, l->profiles, l->n_profiles * sizeof *l->profiles, &s->profiles, err);
+        if (!code && l->n_sky)
+            code = upload(x, l->sky, l->n_sky * sizeof *l->sky, &s->sky, err);
+        if (!code)
+            code = rl_memory_new(x->device, sizeof(frame_t), 0, &s->frame, err);
     }
     return code;
 }
 
-rl_code rl_executor_new(rl_device *device, const rl_plan *plan, const rl_materials *materials,
-                        const rl_light_setup *lights, int threads, const rl_log *log, rl_executor **out,
-                        rl_error *err)
+rl_code rl_executor_new(rl_device *device, const rl_plan *plan, const rl_scene *scenes, size_t n_scenes,
+                        int threads, const rl_log *log, rl_executor **out, rl_error *err)
 {
     *out = NULL;
     rl_executor *x = rl_calloc(1, sizeof *x);
@@ -114,25 +79,20 @@ rl_code rl_executor_new(rl_device *device, const rl_plan *plan, const rl_materia
         return rl_fail_memory(err, sizeof *x);
     x->device = device;
     x->plan = plan;
-    x->material_table = materials;
-    x->kinds = lights->kinds;
     x->log = log;
+    x->scenes = rl_arena_array(&x->arena, n_scenes, sizeof *x->scenes);
     x->nodes = rl_arena_array(&x->arena, plan->graph->n_nodes + 1, sizeof *x->nodes);
     x->slots = rl_arena_array(&x->arena, plan->n_slots + 1, sizeof *x->slots);
     x->history = rl_arena_array(&x->arena, 2 * plan->n_buffers + 1, sizeof *x->history);
-    rl_code code = x->nodes && x->slots && x->history ? RL_OK : rl_fail_memory(err, 1);
+    rl_code code = x->nodes && x->slots && x->history && x->scenes ? RL_OK : rl_fail_memory(err, 1);
+    for (size_t i = 0; i < n_scenes && !code; i++)
+        x->scenes[x->n_scenes++].scene = scenes[i];
     if (!code)
-        code = build_programs(x, threads, err);
+        code = rl_executor_build(x, threads, err);
     for (size_t i = 0; i < plan->n_nodes && !code; i++)
         code = make_constants(x, plan->nodes[i].node, err);
     if (!code)
-        code = upload(x, materials->data, materials->count * materials->entry_bytes, &x->materials, err);
-    if (!code && lights->n_profiles)
-        code = upload(x, lights->profiles, lights->n_profiles * sizeof *lights->profiles, &x->profiles, err);
-    if (!code && lights->n_sky)
-        code = upload(x, lights->sky, lights->n_sky * sizeof *lights->sky, &x->sky, err);
-    if (!code)
-        code = rl_memory_new(device, sizeof(frame_t), 0, &x->frame, err);
+        code = upload_scenes(x, err);
     if (code)
         rl_executor_free(&x);
     *out = x;
@@ -162,12 +122,14 @@ void rl_executor_free(rl_executor **executor)
         rl_memory_free(&x->nodes[i].tables);
     }
     rl_program_free(&x->convert);
-    rl_memory_free(&x->materials);
-    rl_memory_free(&x->frame);
-    rl_memory_free(&x->lights);
-    rl_memory_free(&x->ambient);
-    rl_memory_free(&x->profiles);
-    rl_memory_free(&x->sky);
+    for (size_t i = 0; i < x->n_scenes; i++) {
+        rl_memory_free(&x->scenes[i].materials);
+        rl_memory_free(&x->scenes[i].frame);
+        rl_memory_free(&x->scenes[i].lights);
+        rl_memory_free(&x->scenes[i].ambient);
+        rl_memory_free(&x->scenes[i].profiles);
+        rl_memory_free(&x->scenes[i].sky);
+    }
     rl_arena_free(&x->arena);
     rl_free(x);
 }
@@ -289,6 +251,7 @@ static rl_code run_kernel(rl_executor *x, const rl_plan_step *s, const rl_frame_
 {
     const rl_graph_node *g = &x->plan->graph->nodes[s->node];
     const rl_node_state *n = &x->nodes[s->node];
+    const rl_scene_state *scene = &x->scenes[g->scene];
     const rl_pass *pass = g->pass;
     const rl_step *step = &pass->steps.rows[s->step];
     rl_memory *args[MOST_ARGUMENTS];
@@ -300,15 +263,15 @@ static rl_code run_kernel(rl_executor *x, const rl_plan_step *s, const rl_frame_
         args[k++] = locate(x, f, s->buffers[i], pass->ports.rows[i].role == RL_HISTORY);
     if (pass->params.n > 0)
         args[k++] = n->params;
-    args[k++] = x->frame;
-    args[k++] = x->materials;
+    args[k++] = scene->frame;
+    args[k++] = scene->materials;
     if (pass->lights)
-        args[k++] = x->lights;
+        args[k++] = scene->lights;
     if (pass->ambient)
-        args[k++] = x->ambient;
+        args[k++] = scene->ambient;
     if (pass->light_tables) {
-        args[k++] = x->profiles;
-        args[k++] = x->sky;
+        args[k++] = scene->profiles;
+        args[k++] = scene->sky;
     }
     if (pass->tables)
         args[k++] = n->tables;
@@ -324,7 +287,8 @@ static rl_code run_convert(rl_executor *x, const rl_plan_step *s, const rl_frame
                            rl_error *err)
 {
     const rl_buffer *from = &x->plan->buffers[s->buffers[0]], *to = &x->plan->buffers[s->buffers[1]];
-    rl_memory *args[] = {locate(x, f, s->buffers[0], false), locate(x, f, s->buffers[1], false), x->frame};
+    rl_memory *args[] = {locate(x, f, s->buffers[0], false), locate(x, f, s->buffers[1], false),
+                         x->scenes[0].frame};
     rl_dispatch d = {
         .entry = to->layout == RL_PHASE4 ? "linear_to_phase4" : "phase4_to_linear",
         .arguments = args,
@@ -349,8 +313,10 @@ static rl_code run_step(rl_executor *x, const rl_plan_step *s, const rl_frame_bu
     return rl_fail(err, RL_E_INTERNAL, RL_NOWHERE, "a step of an unknown kind");
 }
 
-static rl_code upload_frame(rl_executor *x, const rl_frame_values *v, rl_error *err)
+static rl_code upload_scene(rl_executor *x, const rl_frame_values *v, size_t scene, rl_error *err)
 {
+    rl_scene_state *s = &x->scenes[scene];
+    const rl_scene_values *own = &v->scenes[scene];
     const rl_geometry *g = &x->geometry;
     int left = g->x - g->origin_x, top = g->y - g->origin_y;
     frame_t f = {.columns = g->columns,
@@ -363,23 +329,25 @@ static rl_code upload_frame(rl_executor *x, const rl_frame_values *v, rl_error *
                  .plane4 = g->plane4,
                  .number = v->number,
                  .history = x->has_history,
-                 .materials = (int)x->material_table->count,
-                 .lights = v->n_lights,
+                 .materials = (int)s->scene.materials->count,
+                 .lights = own->n_lights,
                  .camera = v->camera,
                  .previous = x->has_history ? x->previous : v->camera};
-    rl_code code = upload(x, &f, sizeof f, &x->frame, err);
+    rl_code code = upload(x, &f, sizeof f, &s->frame, err);
     if (!code)
-        code = upload(x, v->lights, (size_t)v->n_lights * sizeof *v->lights, &x->lights, err);
+        code = upload(x, own->lights, (size_t)own->n_lights * sizeof *own->lights, &s->lights, err);
     const ambient_t none = {0};
     if (!code)
-        code = upload(x, v->ambient ? v->ambient : &none, sizeof none, &x->ambient, err);
+        code = upload(x, own->ambient ? own->ambient : &none, sizeof none, &s->ambient, err);
     return code;
 }
 
 rl_code rl_executor_run(rl_executor *x, rl_frame_buffers *buffers, const rl_frame_values *values,
                         rl_span *spans, rl_error *err)
 {
-    rl_code code = upload_frame(x, values, err);
+    rl_code code = RL_OK;
+    for (size_t i = 0; i < x->n_scenes && !code; i++)
+        code = upload_scene(x, values, i, err);
     for (size_t i = 0; i < x->plan->n_steps && !code; i++)
         code = run_step(x, &x->plan->steps[i], buffers, spans ? &spans[i] : NULL, err);
     rl_code finished = rl_device_finish(x->device, code ? NULL : err);

@@ -25,11 +25,17 @@ typedef struct rl_light_setup {
     size_t n_profiles, n_sky; /* floats */
 } rl_light_setup;
 
-/* Builds the programs of all live nodes, on up to `threads` threads. Keeps pointers to all arguments but
- * `lights`, whose tables are copied. */
-rl_code rl_executor_new(rl_device *device, const rl_plan *plan, const rl_materials *materials,
-                        const rl_light_setup *lights, int threads, const rl_log *log, rl_executor **out,
-                        rl_error *err);
+/* What the kernels of a node read besides images and parameters: those of node.scene. One, or one a variant
+ * of a merged graph. */
+typedef struct rl_scene {
+    const rl_materials *materials;
+    rl_light_setup lights; /* the tables must live as long as the executor */
+} rl_scene;
+
+/* Builds the programs of all live nodes, on up to `threads` threads; nodes whose texts are equal share one.
+ * Keeps pointers to all arguments but the array of scenes. */
+rl_code rl_executor_new(rl_device *device, const rl_plan *plan, const rl_scene *scenes, size_t n_scenes,
+                        int threads, const rl_log *log, rl_executor **out, rl_error *err);
 void rl_executor_free(rl_executor **executor);
 
 /* Allocates slots and history for frames of this size (nothing happens when it is the size already); history
@@ -48,12 +54,16 @@ rl_memory *rl_frame_buffers_memory(const rl_frame_buffers *buffers, int buffer);
 
 /* What changes from frame to frame, besides pixels. The executor fills sizes, history and the previous
  * camera. */
-typedef struct rl_frame_values {
-    int number;
-    camera_t camera;
+typedef struct rl_scene_values {
     const light_t *lights;
     int n_lights;             /* at most what it was for the first frame, or any number for it */
     const ambient_t *ambient; /* NULL = none */
+} rl_scene_values;
+
+typedef struct rl_frame_values {
+    int number;
+    camera_t camera;
+    const rl_scene_values *scenes; /* as many as the executor has */
 } rl_frame_values;
 
 /* Runs all steps and waits for them; then history swaps. On an error history is empty afterwards. `spans` may

@@ -43,6 +43,12 @@ static rl_code read_pipeline(rl_session *s, rl_error *err)
 
 rl_code rl_session_open(const rl_options *options, rl_session **out, rl_error *err)
 {
+    return rl_session_open_variant(options, NULL, out, err);
+}
+
+rl_code rl_session_open_variant(const rl_options *options, const char *variant, rl_session **out,
+                                rl_error *err)
+{
     rl_error local = {0};
     err = err ? err : &local;
     *out = NULL;
@@ -51,6 +57,7 @@ rl_code rl_session_open(const rl_options *options, rl_session **out, rl_error *e
         return rl_fail_memory(err, sizeof *s);
     s->options = *options;
     s->log = options->log;
+    s->variant = variant;
     long cpus = sysconf(_SC_NPROCESSORS_ONLN);
     s->threads = options->threads > 0 ? options->threads : cpus > 0 ? (int)cpus : 1;
     rl_code code = rl_pool_new(s->threads, &s->pool, err);
@@ -58,6 +65,8 @@ rl_code rl_session_open(const rl_options *options, rl_session **out, rl_error *e
         code = read_pipeline(s, err);
     if (!code)
         code = rl_session_colors(s, err);
+    if (!code && variant)
+        code = rl_session_compared(s, err);
     if (!code)
         code = rl_session_ambient(s, err);
     if (!code)
@@ -92,15 +101,19 @@ void rl_session_close(rl_session **session)
     rl_free(s);
 }
 
+static rl_code prepare_sequence(rl_session *s, rl_sequence *q, rl_error *err)
+{
+    rl_scene scene = {q->materials, q->setup};
+    return rl_executor_new(s->device, q->plan, &scene, 1, s->threads, s->log, &q->executor, err);
+}
+
 rl_code rl_session_prepare(rl_session *s, rl_error *err)
 {
     rl_code code =
         s->device ? RL_OK : rl_device_open(s->options.device, s->options.threads, s->log, &s->device, err);
     for (size_t i = 0; i < s->n_sequences && !code; i++)
         if (!s->sequences[i].executor)
-            code =
-                rl_executor_new(s->device, s->sequences[i].plan, s->sequences[i].materials,
-                                &s->sequences[i].setup, s->threads, s->log, &s->sequences[i].executor, err);
+            code = prepare_sequence(s, &s->sequences[i], err);
     return code;
 }
 

@@ -28,6 +28,11 @@ typedef struct rl_active_light {
     int profile;         /* where its profile is in the table of all, 0 = none */
 } rl_active_light;
 
+/* Of a variant: the images that are compared (experiment.h), for people. */
+typedef struct rl_compared_names {
+    const char *linear, *display;
+} rl_compared_names;
+
 /* One capture with all that depends on it. Constant after rl_session_open, except for the executor. */
 typedef struct rl_sequence {
     rl_manifest *manifest;
@@ -41,6 +46,7 @@ typedef struct rl_sequence {
     const rl_node *nodes; /* the pipeline's, with this capture's sets of materials */
     const rl_graph *graph;
     const rl_plan *plan;
+    size_t first_output;   /* where its outputs begin in a merged graph's (experiment.h); else 0 */
     rl_geometry geometry;  /* of the first frame */
     uint64_t decode_bytes; /* that reading it takes besides its buffers */
     rl_reader *reader;
@@ -64,8 +70,11 @@ struct rl_session {
     rl_pool *pool;
     rl_device *device;
     rl_sink_output *outputs; /* the pipeline's that are wanted, then one for each dump */
-    rl_wanted *wanted;       /* the same, then a hidden one for depth and stencil */
-    size_t n_outputs;
+    rl_wanted *wanted; /* the same, then the hidden ones: depth and stencil, and of a variant the images that
+                          are compared */
+    size_t n_outputs, n_hidden;
+    const char *variant; /* NULL: none */
+    rl_compared_names compared;
     rl_sequence *sequences;
     size_t n_sequences;
     size_t *ends; /* [n_sequences] how many frames captures 0…k have together */
@@ -78,11 +87,18 @@ struct rl_session {
     size_t n_viewed;
 };
 
+/* session.c: rl_session_open for a variant of that name, which keeps the images that are compared. */
+rl_code rl_session_open_variant(const rl_options *options, const char *variant, rl_session **out,
+                                rl_error *err);
+
 /* session_run.c: ends what rl_session_image gave out. */
 void rl_session_end_views(rl_session *session);
 
 /* session_color.c: opens the OCIO config, checks every colour name, makes the passes of the outputs. */
 rl_code rl_session_colors(rl_session *session, rl_error *err);
+/* The colour transform of an output as a pass, and what its file says of it. */
+rl_code rl_session_make_output(rl_session *session, const rl_output *spec, rl_sink_output *out,
+                               rl_wanted *wanted, rl_error *err);
 /* The matrix from a linear colour space (named at `where`) to the working space. */
 rl_code rl_session_light_matrix(const rl_session *session, const char *space, rl_where where, float m[9],
                                 rl_error *err);
@@ -94,8 +110,15 @@ void rl_session_light_values(const rl_sequence *sequence, const camera_t *camera
 /* session_ambient.c: the pipeline's ambient light; reads its HDRI. */
 rl_code rl_session_ambient(rl_session *session, rl_error *err);
 
+/* session_compared.c: adds the hidden outputs of what is compared. */
+rl_code rl_session_compared(rl_session *session, rl_error *err);
+
 /* session_capture.c: manifests, frames, materials, graph and plan of every capture. */
 rl_code rl_session_sequences(rl_session *session, rl_error *err);
+/* Makes the reader anew, for another plan: what frames are read into. */
+rl_code rl_sequence_read_for(rl_session *session, rl_sequence *sequence, const rl_plan *plan, bool keep_ids,
+                             rl_error *err);
+bool rl_session_keeps_ids(const rl_session *session);
 void rl_sequence_close(rl_sequence *sequence);
 
 /* session_paths.c: no two outputs, captures or frames write one file. */
@@ -105,8 +128,20 @@ rl_code rl_session_paths(rl_session *session, rl_error *err);
  * history reaches it. `spans`: NULL, or plan->n_steps of them. */
 rl_code rl_session_execute(rl_session *session, rl_sequence *sequence, rl_frame *frame, rl_span *spans,
                            rl_error *err);
+/* The same with the lights and ambient lights of all scenes of the executor. */
+rl_code rl_sequence_execute(rl_sequence *sequence, rl_frame *frame, const rl_scene_values *scenes,
+                            rl_span *spans, rl_error *err);
 /* Buffers follow the size of the frame that they hold. */
 rl_code rl_session_fit_buffers(rl_sequence *sequence, rl_frame *frame, rl_error *err);
+/* session_load.c: reads frame `index` of the sequence into frame->buffers, or what --on-missing puts in its
+ * place. Errors are frame->error. */
+typedef struct rl_loaded {
+    bool skipped; /* missing, and not to be written */
+    bool held;    /* the layers are of frame `source`: no past of the next one */
+    size_t source;
+} rl_loaded;
+void rl_session_load(rl_session *session, rl_sequence *sequence, size_t index, rl_frame *frame,
+                     rl_loaded *out);
 /* Writes all outputs of a frame that ran; files[0…n_outputs-1] (may be NULL: memory was out) get the names of
  * those that are whole. */
 rl_code rl_session_write_frame(rl_session *session, rl_sequence *sequence, rl_frame *frame,

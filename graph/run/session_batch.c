@@ -11,61 +11,13 @@ typedef struct batch_state {
     rl_session *s;
     rl_sequence *q;
     rl_frame frames[RL_MOST_IN_FLIGHT];
-    bool skipped[RL_MOST_IN_FLIGHT], held[RL_MOST_IN_FLIGHT];
+    rl_loaded loaded[RL_MOST_IN_FLIGHT];
     const rl_run_hooks *hooks;
     rl_run_summary *summary;
     size_t done, total; /* frames of all captures that this run writes */
     rl_sequence_state state;
     rl_span *spans; /* [plan->n_steps] when somebody wants to know */
 } batch_state;
-
-/* The frame of a number, under the files of another one when that is held. */
-static rl_code load_frame(batch_state *b, rl_frame *f, int file_number, rl_error *err)
-{
-    f->nonfinite = f->clamped = 0;
-    rl_code code = rl_reader_open(b->q->reader, file_number, f, err);
-    if (!code)
-        code = rl_session_fit_buffers(b->q, f, err);
-    return code ? code : rl_reader_pixels(b->q->reader, f, b->s->pool, err);
-}
-
-/* The layers of the nearest frame before it that can be read, under its own number. Returns its index, or
- * `index` when there is none. */
-static size_t hold_frame(batch_state *b, rl_frame *f, size_t index, int slot)
-{
-    rl_error why = f->error;
-    rl_where where = {.file = why.file};
-    for (size_t k = index; k-- > 0;) {
-        f->error = (rl_error){0};
-        load_frame(b, f, b->q->frames.numbers[k], &f->error);
-        if (rl_reader_missed(f->error.code))
-            continue;
-        rl_report(b->s->log, RL_WARNING, where, "frame %d holds the layers of frame %d: %s", f->number,
-                  b->q->frames.numbers[k], why.text);
-        b->held[slot] = true;
-        return k;
-    }
-    f->error = (rl_error){0};
-    rl_fail(&f->error, why.code, where, "%s (there is no frame before it to hold)", why.text);
-    return index;
-}
-
-/* A frame whose files are missing or broken: what --on-missing says. Returns the index of the frame that was
- * read. */
-static size_t miss_frame(batch_state *b, rl_frame *f, size_t index, int slot)
-{
-    rl_where where = {.file = f->error.file};
-    switch (b->s->options.on_missing) {
-    case RL_MISSING_SKIP:
-        rl_report(b->s->log, RL_WARNING, where, "frame %d is skipped: %s", f->number, f->error.text);
-        b->skipped[slot] = true;
-        return index;
-    case RL_MISSING_HOLD:
-        return hold_frame(b, f, index, slot);
-    default:
-        return index;
-    }
-}
 
 static void batch_load(void *ctx, size_t item, int slot)
 {
@@ -74,16 +26,9 @@ static void batch_load(void *ctx, size_t item, int slot)
     size_t index = b->state.work[item].frame;
     double start = rl_state_now();
     f->number = b->q->frames.numbers[index];
-    f->error = (rl_error){0};
-    f->run_s = f->write_s = 0;
-    f->nonfinite = f->clamped = f->clipped = 0;
-    b->skipped[slot] = b->held[slot] = false;
     rl_session_stage(b->hooks, RL_LANE_READ, f);
-    load_frame(b, f, f->number, &f->error);
-    size_t source = index;
-    if (rl_reader_missed(f->error.code))
-        source = miss_frame(b, f, index, slot);
-    rl_state_loaded(&b->state, slot, index, source);
+    rl_session_load(b->s, b->q, index, f, &b->loaded[slot]);
+    rl_state_loaded(&b->state, slot, index, b->loaded[slot].source);
     f->load_s = rl_state_now() - start;
     rl_session_span(b->hooks, b->q, f, RL_LANE_READ, "read", "decode", start);
 }
@@ -99,12 +44,12 @@ static void batch_run(void *ctx, size_t item, int slot)
     rl_sequence *q = b->q;
     rl_state_ready(&b->state, work, slot, &restored, &q->last_number, &q->last_camera, &f->error);
     q->has_last =
-        !f->error.code && !b->held[slot] && (restored || (q->has_last && work->start == RL_START_ON));
+        !f->error.code && !b->loaded[slot].held && (restored || (q->has_last && work->start == RL_START_ON));
     if (!f->error.code)
         rl_session_execute(b->s, q, f, b->spans, &f->error);
     if (!f->error.code)
-        rl_session_step_spans(b->hooks, b->s, b->q, f, b->spans);
-    q->has_last = !f->error.code && !b->held[slot]; /* a held frame is no past of the next one */
+        rl_session_step_spans(b->hooks, b->q, f, b->spans);
+    q->has_last = !f->error.code && !b->loaded[slot].held; /* a held frame is no past of the next one */
     rl_state_ran(&b->state, slot, f, q->has_last);
     f->run_s = rl_state_now() - start;
     rl_session_span(b->hooks, b->q, f, RL_LANE_RUN, "run", "kernels", start);
@@ -126,7 +71,7 @@ static void batch_write(void *ctx, size_t item, int slot)
     f->write_s = rl_state_now() - start;
     rl_session_span(b->hooks, b->q, f, RL_LANE_WRITE, "write", "write", start);
     rl_frame_release(f);
-    if (b->skipped[slot])
+    if (b->loaded[slot].skipped)
         f->error = (rl_error){0};
     bool shown = work->write || f->error.code; /* warm-up is nobody's business unless it fails */
     b->done += work->write;

@@ -212,7 +212,7 @@ static rl_code make_plan(rl_session *s, rl_sequence *q, rl_error *err)
     rl_code code = list_layers(s, q, &layers, &n, err);
     if (!code)
         code = rl_graph_build(&s->arena, q->nodes, s->pipeline->n_nodes, layers, n, s->wanted,
-                              s->n_outputs + 1, &q->graph, err);
+                              s->n_outputs + s->n_hidden, &q->graph, err);
     if (!code)
         code = check_formats(s, q->graph, err);
     if (!code)
@@ -224,7 +224,7 @@ static rl_code make_plan(rl_session *s, rl_sequence *q, rl_error *err)
     return code;
 }
 
-static bool wants_ids(const rl_session *s)
+bool rl_session_keeps_ids(const rl_session *s)
 {
     for (size_t i = 0; i < s->n_outputs; i++)
         for (size_t k = 0; k < s->wanted[i].n_layers; k++)
@@ -266,19 +266,25 @@ static rl_code measure(const rl_session *s, rl_sequence *q, rl_error *err)
     return first.code;
 }
 
-static rl_code make_reader(rl_session *s, rl_sequence *q, rl_error *err)
+rl_code rl_sequence_read_for(rl_session *s, rl_sequence *q, const rl_plan *plan, bool keep_ids, rl_error *err)
 {
     rl_reader_setup setup = {.manifest = q->manifest,
-                             .plan = q->plan,
+                             .plan = plan,
                              .materials = q->materials,
                              .shadow = q->shadow,
                              .shadow_thickness = q->thickness,
                              .ocio = s->ocio,
                              .working = s->working,
-                             .keep_ids = wants_ids(s),
+                             .keep_ids = keep_ids,
                              .limit = s->options.memory_limit,
                              .log = s->log};
-    rl_code code = rl_reader_new(&setup, &q->reader, err);
+    rl_reader_free(&q->reader);
+    return rl_reader_new(&setup, &q->reader, err);
+}
+
+static rl_code make_reader(rl_session *s, rl_sequence *q, rl_error *err)
+{
+    rl_code code = rl_sequence_read_for(s, q, q->plan, rl_session_keeps_ids(s), err);
     return code || q->manifest->n_patterns == 0 ? code : measure(s, q, err);
 }
 

@@ -24,8 +24,8 @@ static rl_code open_config(rl_session *s, rl_error *err)
 
 /* Only rgb images are colours; the graph knows formats later, so a converting output must name images that
  * turn out to be rgb: the graph's format check says so. */
-static rl_code make_output(rl_session *s, const rl_output *spec, rl_sink_output *out, rl_wanted *wanted,
-                           rl_error *err)
+rl_code rl_session_make_output(rl_session *s, const rl_output *spec, rl_sink_output *out, rl_wanted *wanted,
+                               rl_error *err)
 {
     rl_color_pass pass = {0};
     const char *target = s->working;
@@ -177,7 +177,7 @@ rl_code rl_session_colors(rl_session *s, rl_error *err)
         code = rl_color_space(s->ocio, s->pipeline->working, s->pipeline->color_where, &s->working, err);
     else if (!code)
         code = rl_color_working(s->ocio, s->pipeline->color_where, &s->working, err);
-    size_t most = s->pipeline->n_outputs + s->options.n_dump + 1;
+    size_t most = s->pipeline->n_outputs + s->options.n_dump + 3; /* and the hidden ones */
     s->outputs = rl_arena_array(&s->arena, most, sizeof *s->outputs);
     s->wanted = rl_arena_array(&s->arena, most, sizeof *s->wanted);
     if (!code && (!s->outputs || !s->wanted))
@@ -186,16 +186,18 @@ rl_code rl_session_colors(rl_session *s, rl_error *err)
         const rl_output *spec = &s->pipeline->outputs[i];
         if (!selected(s, spec->name))
             continue;
-        code = make_output(s, spec, &s->outputs[s->n_outputs], &s->wanted[s->n_outputs], err);
+        code = rl_session_make_output(s, spec, &s->outputs[s->n_outputs], &s->wanted[s->n_outputs], err);
         s->n_outputs++;
     }
     for (size_t i = 0; i < s->options.n_dump && !code; i++) {
         const rl_output *spec = dump_spec(s, s->options.dump[i]);
-        code = spec ? make_output(s, spec, &s->outputs[s->n_outputs], &s->wanted[s->n_outputs], err)
-                    : rl_fail_memory(err, sizeof *spec);
+        code = spec
+                   ? rl_session_make_output(s, spec, &s->outputs[s->n_outputs], &s->wanted[s->n_outputs], err)
+                   : rl_fail_memory(err, sizeof *spec);
         s->n_outputs++;
     }
     if (!code)
         add_required(&s->wanted[s->n_outputs]);
+    s->n_hidden = 1;
     return code;
 }

@@ -18,8 +18,9 @@ static size_t add(size_t a, size_t b)
 static int output_channels(const rl_sequence *q, size_t output)
 {
     int n = 0;
-    for (size_t i = 0; i < q->graph->outputs[output].n_images; i++) {
-        const rl_image *image = &q->graph->images[q->graph->outputs[output].images[i]];
+    const rl_graph_output *o = &q->graph->outputs[q->first_output + output];
+    for (size_t i = 0; i < o->n_images; i++) {
+        const rl_image *image = &q->graph->images[o->images[i]];
         n += image->planes + (image->format == RL_RGB); /* and coverage */
     }
     return n;
@@ -47,15 +48,6 @@ static size_t encode_bytes(const rl_session *s, const rl_sequence *q)
     return add(most, pixels * sizeof(float));
 }
 
-static bool keeps_ids(const rl_session *s)
-{
-    for (size_t i = 0; i < s->n_outputs; i++)
-        for (size_t k = 0; k < s->wanted[i].n_layers; k++)
-            if (!strcmp(s->wanted[i].layers[k].image, "capture.stencil"))
-                return true;
-    return false;
-}
-
 void rl_session_need(const rl_session *s, const rl_sequence *q, int in_flight, rl_memory_need *out)
 {
     *out = (rl_memory_need){0};
@@ -63,8 +55,8 @@ void rl_session_need(const rl_session *s, const rl_sequence *q, int in_flight, r
         return;
     size_t pixels = (size_t)q->geometry.width * (size_t)q->geometry.height;
     out->plan = rl_plan_bytes(q->plan, &q->geometry, in_flight);
-    out->decode =
-        add((size_t)q->decode_bytes, keeps_ids(s) ? pixels * sizeof(uint32_t) * (size_t)in_flight : 0);
+    out->decode = add((size_t)q->decode_bytes,
+                      rl_session_keeps_ids(s) ? pixels * sizeof(uint32_t) * (size_t)in_flight : 0);
     out->encode = add(encode_bytes(s, q), FIXED + (size_t)s->threads * A_THREAD);
     for (size_t i = 0; i < q->plan->n_buffers; i++) /* one copy on its way to the disk */
         if (q->plan->buffers[i].kind == RL_BUFFER_HISTORY)

@@ -48,16 +48,16 @@ void rl_session_span(const rl_run_hooks *hooks, const rl_sequence *q, const rl_f
     hooks->span(hooks->ctx, &span);
 }
 
-/* Nodes behind the pipeline's own were added for the outputs: colour transforms. */
-static const char *category(const rl_session *s, const rl_plan_step *step)
+/* Nodes that no file has were added for the outputs: colour transforms. */
+static const char *category(const rl_graph *graph, const rl_plan_step *step)
 {
     static const char *const others[] = {[RL_STEP_CONVERT] = "convert", [RL_STEP_COPY] = "copy"};
     if (step->kind != RL_STEP_KERNEL)
         return others[step->kind];
-    return (size_t)step->node < s->pipeline->n_nodes ? "kernel" : "colour";
+    return graph->nodes[step->node].where.file ? "kernel" : "colour";
 }
 
-void rl_session_step_spans(const rl_run_hooks *hooks, const rl_session *s, const rl_sequence *q,
+void rl_session_step_spans(const rl_run_hooks *hooks, const rl_sequence *q,
                            const rl_frame *f, const rl_span *spans)
 {
     for (size_t i = 0; spans && hooks && hooks->span && i < q->plan->n_steps; i++) {
@@ -69,7 +69,7 @@ void rl_session_step_spans(const rl_run_hooks *hooks, const rl_session *s, const
             name = rl_arena_printf(&arena, "%s: %s", node->name, node->pass->steps.rows[step->step].entry);
         }
         rl_run_span span = {.lane = RL_LANE_DEVICE,
-                            .category = category(s, step),
+                            .category = category(q->graph, step),
                             .name = name ? name : "",
                             .capture = q->manifest->name,
                             .frame = f->number,

@@ -44,7 +44,8 @@ static rl_code spell(const lister *l, rl_arena *arena, const written *w, const c
         const char *path = rl_manifest_path(arena, m, &layer, w->frame);
         *out = path ? resolve(arena, path) : NULL;
     } else {
-        code = rl_output_path(arena, l->s->outputs[w->output].spec, m->name, w->frame, NULL, out, err);
+        code =
+            rl_output_path(arena, l->s->outputs[w->output].spec, m->name, w->frame, l->s->variant, out, err);
         if (!code && l->out)
             *out = rl_path_join(arena, l->out, *out);
     }

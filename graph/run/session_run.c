@@ -27,24 +27,27 @@ static bool is_cut(const rl_sequence *q, const rl_frame *f)
     return gap || rl_camera_jumped(&q->last_camera, &f->camera, 10);
 }
 
-rl_code rl_session_execute(rl_session *s, rl_sequence *q, rl_frame *f, rl_span *spans, rl_error *err)
+rl_code rl_sequence_execute(rl_sequence *q, rl_frame *f, const rl_scene_values *scenes, rl_span *spans,
+                            rl_error *err)
 {
     rl_code code = rl_executor_resize(q->executor, &f->geometry, err);
     if (code)
         return code;
     if (is_cut(q, f))
         rl_executor_cut(q->executor);
-    rl_session_light_values(q, &f->camera, q->light_values);
-    rl_frame_values values = {.number = f->number,
-                              .camera = f->camera,
-                              .lights = q->light_values,
-                              .n_lights = (int)q->n_lights,
-                              .ambient = &s->ambient};
+    rl_frame_values values = {.number = f->number, .camera = f->camera, .scenes = scenes};
     code = rl_executor_run(q->executor, f->buffers, &values, spans, err);
     q->has_last = !code;
     q->last_number = f->number;
     q->last_camera = f->camera;
     return code;
+}
+
+rl_code rl_session_execute(rl_session *s, rl_sequence *q, rl_frame *f, rl_span *spans, rl_error *err)
+{
+    rl_session_light_values(q, &f->camera, q->light_values);
+    rl_scene_values scene = {q->light_values, (int)q->n_lights, &s->ambient};
+    return rl_sequence_execute(q, f, &scene, spans, err);
 }
 
 /* ---- writing ---------------------------------------------------------------------------------------------
@@ -96,7 +99,8 @@ static rl_code write_output(rl_session *s, rl_sequence *q, rl_frame *f, size_t o
         return rl_fail_memory(err, w->n_layers * sizeof *wr.images);
     rl_code code = RL_OK;
     for (size_t i = 0; i < w->n_layers && !code; i++) {
-        code = rl_session_map_image(q, f, q->plan->outputs[output][i], &wr.images[i], &wr.memory[i], err);
+        code = rl_session_map_image(q, f, q->plan->outputs[q->first_output + output][i], &wr.images[i],
+                                    &wr.memory[i], err);
         wr.images[i].name = w->layers[i].name;
         if (!code)
             restore_ids(f, w->layers[i].image, &wr.images[i]);
@@ -119,7 +123,8 @@ rl_code rl_session_write_frame(rl_session *s, rl_sequence *q, rl_frame *f, const
         return rl_fail_memory(err, s->n_outputs * sizeof *files);
     rl_sink_image stencil = {0};
     rl_memory *memory = NULL;
-    rl_code code = rl_session_map_image(q, f, q->plan->outputs[s->n_outputs][1], &stencil, &memory, err);
+    rl_code code = rl_session_map_image(q, f, q->plan->outputs[q->first_output + s->n_outputs][1], &stencil,
+                                        &memory, err);
     rl_sink_frame frame = {.data_window = f->data_window,
                            .display_window = f->display_window,
                            .crop = s->options.crop[2] > 0 ? s->options.crop : NULL,
@@ -132,7 +137,8 @@ rl_code rl_session_write_frame(rl_session *s, rl_sequence *q, rl_frame *f, const
     for (size_t i = 0; i < s->n_outputs && !code; i++) {
         const char *name = NULL;
         double start = rl_state_now();
-        code = rl_output_path(arena, s->outputs[i].spec, q->manifest->name, f->number, NULL, &name, err);
+        code =
+            rl_output_path(arena, s->outputs[i].spec, q->manifest->name, f->number, s->variant, &name, err);
         const char *path = code ? NULL : rl_path_join(arena, s->options.out ? s->options.out : "out", name);
         if (!code && !path)
             code = rl_fail_memory(err, 1);

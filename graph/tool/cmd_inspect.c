@@ -4,6 +4,8 @@
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
+#include <sys/stat.h>
 
 #include "graph/base/file.h"
 #include "graph/tool/capture.h"
@@ -224,6 +226,13 @@ static rl_code print_one(rl_tool *tool, const char *path, rl_str *out, rl_error 
     return code ? code : print_mapping(tool->arena, &capture, out, err);
 }
 
+/* `relit inspect DIR > DIR/capture.yaml`: the shell has made the file, and nothing is in it yet. */
+static bool is_empty_file(const char *path)
+{
+    struct stat about;
+    return !stat(path, &about) && S_ISREG(about.st_mode) && about.st_size == 0;
+}
+
 int rl_cmd_inspect(rl_tool *tool, rl_error *err)
 {
     rl_str text = {0};
@@ -233,7 +242,7 @@ int rl_cmd_inspect(rl_tool *tool, rl_error *err)
     rl_code code;
     if (folder && !manifest)
         code = rl_fail_memory(err, strlen(path));
-    else if (folder && !rl_path_exists(manifest))
+    else if (folder && (!rl_path_exists(manifest) || is_empty_file(manifest)))
         code = print_folder(tool, path, &text, err);
     else if (!strcasecmp(rl_path_extension(path), ".exr") && rl_path_exists(path))
         code = print_one(tool, path, &text, err);

@@ -1,0 +1,61 @@
+/* What experiment*.c share. */
+#ifndef RL_RUN_EXPERIMENT_PARTS_H
+#define RL_RUN_EXPERIMENT_PARTS_H
+
+#include "graph/model/graph_merge.h"
+#include "graph/run/experiment.h"
+#include "graph/run/session.h"
+
+enum {
+    RL_HIDDEN_REQUIRED, /* behind a session's outputs: depth and stencil */
+    RL_HIDDEN_COMPARED  /* then the images of rl_compared */
+};
+
+/* Variants that read frames alike. The first member leads: its sequence has the group's reader and executor.
+ */
+typedef struct rl_group {
+    size_t *members; /* variants, ascending */
+    size_t n;
+    const char *reason; /* why it is not in a group before it */
+    const rl_merged *merged;
+    const rl_plan *plan;
+    bool **used;     /* [nodes][variants] */
+    bool **wanted;   /* the same, for outputs that are files alone */
+    double *node_ns; /* [nodes]: on the device, of all frames that ran */
+    double step_ns;  /* of conversions and copies */
+    double load_ns;  /* reading */
+    size_t frames;   /* that ran and are in these sums: the first only until there is a second, since it has
+                        programs to compile and files to find */
+    bool warm;       /* the first is left out */
+} rl_group;
+
+typedef struct rl_experiment_capture {
+    rl_group *groups;
+    size_t n_groups;
+    int in_flight;
+    double *write_ns; /* [variants]: of write_frames frames, the first left out in the same way */
+    size_t write_frames;
+    bool write_warm;
+} rl_experiment_capture;
+
+struct rl_experiment {
+    rl_arena arena;
+    rl_options options;
+    const rl_log *log;
+    const rl_variant *variants;
+    rl_session **sessions; /* [n] */
+    size_t n;
+    rl_experiment_capture *captures;
+    size_t n_captures;
+    rl_device *device;
+};
+
+static inline rl_sequence *rl_experiment_sequence(const rl_experiment *x, size_t variant, size_t capture)
+{
+    return &x->sessions[variant]->sequences[capture];
+}
+
+/* experiment_groups.c: groups, merged graphs and plans of a capture, in the sessions' sequences too. */
+rl_code rl_experiment_merge(rl_experiment *experiment, size_t capture, rl_error *err);
+
+#endif
