@@ -260,7 +260,10 @@ static rl_code check_keys(const rl_value *v, const rl_light_spec *l, rl_error *e
         if (x && !keys[i].used)
             return rl_fail(err, RL_E_CONFIG, x->where, "light '%s': a %s light has no '%s'%s", l->name,
                            rl_light_type_names[l->type], keys[i].key,
-                           types[l->type].shaped && !strcmp(keys[i].key, "up") ? " without 'ies'" : "");
+                           types[l->type].shaped &&
+                                   (!strcmp(keys[i].key, "up") || !strcmp(keys[i].key, "direction"))
+                               ? " without 'ies'"
+                               : "");
     }
     return RL_OK;
 }
