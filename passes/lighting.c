@@ -119,7 +119,7 @@ static double cost(const void *p)
 
 const rl_pass rl_pass_lighting = {
     .name = "lighting",
-    .help = "direct and ambient light: diffuse transmission, specular reflection, translucency",
+    .help = "direct, area and ambient light: diffuse transmission, specular reflection, translucency",
     .source = "Golubev 2018; Helix; Walter 2007; Heitz 2014; Heitz et al. 2016",
     .kernel = "lighting.cl",
     .kernel_prelude = "sg.cl surface.cl sg_shade.cl screen_shadow.cl ltc.cl area.cl light_tables.cl",

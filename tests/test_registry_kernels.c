@@ -197,7 +197,8 @@ static size_t make_arguments(const form *f, rl_memory **args)
     frame.previous = frame.camera;
     for (size_t i = 0; i < p->ports.n; i++)
         args[n++] = f->buffers[i] < 0 ? NULL : image_memory();
-    size_t extra = (p->params.n > 0) + 2u + p->lights + p->ambient + 2u * p->light_tables + (p->tables != NULL);
+    size_t extra =
+        (p->params.n > 0) + 2u + p->lights + p->ambient + 2u * p->light_tables + (p->tables != NULL);
     for (size_t i = 0; i < extra; i++)
         assert_int_equal(rl_memory_new(device, 1 << 18, 0, &args[n + i], &err), RL_OK);
     if (p->params.n > 0)
