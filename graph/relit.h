@@ -66,6 +66,7 @@ typedef struct rl_options {
     int shard[2]; /* {I, N}: the I-th of N parts, from 1; N = 0: everything */
     int preroll;  /* frames of warm-up before a shard's first; 0 = history comes from the shard before it */
     int checkpoint_frames; /* a checkpoint of history every so many frames; 0 = by what one costs */
+    bool energy;           /* experiments keep the ledger of energy (graph/run/energy.h) */
     const char *ocio;      /* OpenColorIO config; NULL = the pipeline's, else $OCIO, else relit's own */
     const rl_log *log;
 } rl_options;
@@ -126,10 +127,11 @@ typedef struct rl_frame_result {
     const rl_error *error; /* code RL_OK when it went well */
     size_t n_files;        /* written */
     const char *const *files;
-    uint64_t nonfinite, clamped;   /* samples of the capture that were NaN or infinite (now 0), or clamped */
-    uint64_t clipped;              /* samples of the outputs beyond what their files can hold */
-    double load_s, run_s, write_s; /* seconds in each stage */
-    size_t done, total;            /* frames of the whole run, this one included */
+    uint64_t nonfinite, clamped; /* samples of the capture that were NaN or infinite (now 0), or clamped */
+    uint64_t clipped;            /* samples of the outputs beyond what their files can hold */
+    double load_s, run_s,
+        write_s;        /* seconds in each stage; < 0: not known of this frame alone, nor the counts */
+    size_t done, total; /* frames of the whole run, this one included */
 } rl_frame_result;
 
 /* What took which time: a stage of a frame (category "read", "run", "write", "checkpoint"), an output that

@@ -136,6 +136,11 @@ static inline floatv rl_load4(global const float *p, constant frame_t *f, int x,
 #endif
 }
 
+/* What RL_STORE has stored. */
+#define RL_LOAD(port, plane_, x, y)                                                                          \
+    (RL_CAT(LAYOUT_, port) == RL_LINEAR ? rl_load(port + (plane_) * f->plane, rl_index(f, x, y))             \
+                                        : rl_load4(port + (plane_) * f->plane4, f, x, y))
+
 /* ---- masks ------------------------------------------------------------------------------------------------ */
 
 /* A mask has all bits of a lane set or none. */

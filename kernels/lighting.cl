@@ -121,13 +121,17 @@ static inline void shade(constant material_t *m, surface_t *s, const source_t *f
     }
 }
 
-kernel void lighting(global const float *albedo, global const float *normal, global const float *depth,
-                     global const uint *stencil, global const float *thickness, global const float *shadow,
-                     global const float *shadow_thickness, global const float *roughness, global const float *specular,
-                     global const float *metallic, global const float *emission, global const float *curvature,
-                     global const float *smooth_normal, global float *diffuse, global float *lit, constant params_t *p, constant frame_t *f,
-                     constant material_t *materials, constant light_t *lights, constant ambient_t *ambient,
-                     global const float *profiles, global const float *sky, constant const float *tables)
+#define LIGHTING_PORTS                                                                                       \
+    global const float *albedo, global const float *normal, global const float *depth,                       \
+        global const uint *stencil, global const float *thickness, global const float *shadow,               \
+        global const float *shadow_thickness, global const float *roughness,                                 \
+        global const float *specular, global const float *metallic, global const float *emission,            \
+        global const float *curvature, global const float *smooth_normal, global float *diffuse,             \
+        global float *lit, ENERGY_PORT constant params_t *p, constant frame_t *f,                            \
+        constant material_t *materials, constant light_t *lights, constant ambient_t *ambient,               \
+        global const float *profiles, global const float *sky, constant const float *tables
+
+kernel void lighting(LIGHTING_PORTS)
 {
     const source_t from = {p, f, lights, ambient, depth, shadow, shadow_thickness, profiles, sky, tables};
     int x = RL_W * (int)get_global_id(0), y = (int)get_global_id(1), at = rl_index(f, x, y);
@@ -171,3 +175,22 @@ kernel void lighting(global const float *albedo, global const float *normal, glo
         rl_store(out_lit[c], lit, at + c * f->plane);
     }
 }
+
+#if WANTS_energy
+kernel void lighting_energy(LIGHTING_PORTS)
+{
+    band_t band = energy_band(energy, f);
+    ENERGY_EACH_VECTOR(f, band, x, y)
+    {
+        int at = rl_index(f, x, y);
+        floatv values[ENERGY_PIXELS];
+        energy_clear(values);
+        for (int c = 0; c < 3; c++) {
+            if (HAS_emission)
+                values[ENERGY_IN + c] = rl_load(emission, at + c * f->plane);
+            values[ENERGY_OUT + c] = RL_LOAD(diffuse, c, x, y) + rl_load(lit, at + c * f->plane);
+        }
+        energy_post_all(&band, f, x, y, rl_load_id(stencil, at), values);
+    }
+}
+#endif

@@ -19,6 +19,26 @@
 #define RL_GUARD   128
 #define RL_MARGIN4 16
 
+/* A frame's sums (RL_SUMS), of a REDUCTION port. Rows are cut into RL_BANDS bands of equal height, whose sums
+ * are apart, so that they are the same bits in whatever order the bands are done. Value v of material m in
+ * band b is the sum of two floats, the large one first, at 2*((b*RL_SUM_MATERIALS + m)*RL_SUM_VALUES + v).
+ * Entries of materials that the frame does not have are undefined. */
+#define RL_BANDS         32
+#define RL_SUM_MATERIALS 256
+#define RL_SUM_VALUES    19
+#define RL_SUM_FLOATS    (2 * RL_BANDS * RL_SUM_MATERIALS * RL_SUM_VALUES)
+
+/* The ledger of energy: values of its sums, each a channel at i, i+1, i+2; then the number of pixels. */
+enum {
+    ENERGY_IN = 0,
+    ENERGY_OUT = 3,
+    ENERGY_BORDER = 6,
+    ENERGY_OFF_SCREEN = 9,
+    ENERGY_CLAMPED = 12,
+    ENERGY_REDISTRIBUTED = 15,
+    ENERGY_PIXELS = 18
+};
+
 /* x right, y down in pixels; view space is right-handed, +x right, +y up, looks down -z; metres. The sample
  * of pixel (x, y) lies at display position (x + 0.5 + jitter[0], y + 0.5 + jitter[1]) and view = ((px -
  * centre[0]) / focal[0] * depth, -(py - centre[1]) / focal[1] * depth, -depth). */

@@ -90,7 +90,7 @@ static inline uint2 pattern_choice(int rotation, int seed, int number, int px, i
 }
 
 /* Taps first…first+n-1, n <= TAP_BLOCK: index of the vector, radius² in units of d, weight, and for
- * weighting: surface how many pixels away, x before y. There are RL_W more indices behind the last, for
+ * weighting: surface and for the ledger how many pixels away, x before y. There are RL_W more indices behind the last, for
  * looking ahead. */
 static inline void place_taps(const inputs_t *in, const group_t *g, constant float *taps, int stride,
                               int first, int n, int *at, float *r2, float *weight, int *shift)
@@ -110,7 +110,7 @@ static inline void place_taps(const inputs_t *in, const group_t *g, constant flo
 #endif
         intv dx = rl_as_intv(fma(u, (floatv)g->k[0], (floatv)magic)) - as_int(magic);
         intv dy = rl_as_intv(fma(v, (floatv)g->k[1], (floatv)magic)) - as_int(magic);
-#if P_weighting == WEIGHTING_SURFACE
+#if P_weighting == WEIGHTING_SURFACE || WANTS_energy
         rl_vstore(dx, 0, shift + i);
         rl_vstore(dy, 0, shift + TAP_BLOCK + i);
 #endif
@@ -163,7 +163,7 @@ static inline void weigh_tap(const group_t *g, floatv r2, floatv dz, floatv shar
 }
 
 /* Weighted means of n taps, whose patterns start at `taps`; lanes without a sample keep what `out` holds. */
-static inline void sum_taps(const inputs_t *in, const group_t *g, constant float *taps, int n, floatv out[3])
+static inline void sum_taps(const inputs_t *in, const group_t *g, constant float *taps, int n, floatv *out)
 {
     int stride = tap_stride(n), plane = in->f->plane4;
     taps += 3 * stride * (int)mul_hi(g->spread, (uint)pattern_count(n));
@@ -173,6 +173,10 @@ static inline void sum_taps(const inputs_t *in, const group_t *g, constant float
     int shift[2 * TAP_BLOCK];
 #if P_weighting == WEIGHTING_SURFACE
     floatv p0 = 0.0f, p1 = 0.0f, p2 = 0.0f;
+#endif
+#if WANTS_energy
+    rejected_t rejected = {{0.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 0.0f}};
+    const floatv own[3] = {out[0], out[1], out[2]};
 #endif
     AREA(floatv per_own = 1.0f / rl_vload(0, in->area + g->v.at);)
     for (int first = 0; first < n; first += TAP_BLOCK) {
@@ -205,8 +209,16 @@ static inline void sum_taps(const inputs_t *in, const group_t *g, constant float
             c0 = fma(e[0], scatter_keep(rl_vload(0, in->diffuse + a), same), c0);
             c1 = fma(e[1], scatter_keep(rl_vload(0, in->diffuse + plane + a), same), c1);
             c2 = fma(e[2], scatter_keep(rl_vload(0, in->diffuse + 2 * plane + a), same), c2);
+#if WANTS_energy
+            weigh_tap(g, g->scale2 * r2[i], dz, weight[i], ~same, e);
+            for (int c = 0; c < 3; c++)
+                scatter_reject(&rejected, c, e[c], scatter_inside(in->f, &g->v, shift[i], shift[TAP_BLOCK + i]));
+#endif
         }
     }
+#if WANTS_energy
+    const floatv w[3] = {w0, w1, w2}, light[3] = {c0, c1, c2};
+#endif
 #if P_weighting == WEIGHTING_SURFACE
     c0 *= fma(g->plane.cosine, w0 / p0 - 1.0f, (floatv)1.0f);
     c1 *= fma(g->plane.cosine, w1 / p1 - 1.0f, (floatv)1.0f);
@@ -215,6 +227,10 @@ static inline void sum_taps(const inputs_t *in, const group_t *g, constant float
     out[0] = rl_select(out[0], c0 / w0, w0 > MIN_WEIGHT);
     out[1] = rl_select(out[1], c1 / w1, w1 > MIN_WEIGHT);
     out[2] = rl_select(out[2], c2 / w2, w2 > MIN_WEIGHT);
+#if WANTS_energy
+    for (int c = 0; c < 3; c++)
+        scatter_account(out, c, own[c], w[c], light[c], &rejected, g->keep, out[c], out[c], MIN_WEIGHT);
+#endif
 }
 
 /* 0 below 0.9 of the threshold, 1 above 1.1 of it. */
@@ -254,9 +270,11 @@ static inline void lay_disk(const inputs_t *in, group_t *g, intv now)
 
 /* The lanes `now` of the group, with the pattern that their size on screen asks for. */
 static inline void filter_group(const inputs_t *in, const group_t *g, constant params_t *p,
-                                constant float *taps, intv now, floatv out[3])
+                                constant float *taps, intv now, floatv *out)
 {
-    floatv sum[3] = {out[0], out[1], out[2]};
+    floatv sum[SCATTER_OUT];
+    for (int c = 0; c < SCATTER_OUT; c++)
+        sum[c] = out[c];
     if (p->taps > 0) {
         sum_taps(in, g, taps, p->taps, sum);
     } else {
@@ -265,23 +283,25 @@ static inline void filter_group(const inputs_t *in, const group_t *g, constant p
         floatv some = beyond(rho, LOD_SOME), many = beyond(rho, LOD_MANY);
         if (!scatter_any(now & (some > 0.0f)))
             return;
-        floatv fine[3] = {out[0], out[1], out[2]};
+        floatv fine[SCATTER_OUT];
+        for (int c = 0; c < SCATTER_OUT; c++)
+            fine[c] = out[c];
         if (scatter_any(now & (many < 1.0f)))
             sum_taps(in, g, taps, TAPS_SOME, sum);
         if (scatter_any(now & (many > 0.0f)))
             sum_taps(in, g, taps + 3 * TAP_BLOCK * MOST_PATTERNS, TAPS_MANY, fine);
-        for (int c = 0; c < 3; c++) {
+        for (int c = 0; c < SCATTER_OUT; c++) {
             sum[c] = fma(many, fine[c] - sum[c], sum[c]);
             sum[c] = fma(some, sum[c] - out[c], out[c]);
         }
     }
-    for (int c = 0; c < 3; c++)
+    for (int c = 0; c < SCATTER_OUT; c++)
         out[c] = rl_select(out[c], sum[c], now);
 }
 
 static inline void filter_material(const inputs_t *in, const vector_t *v, constant params_t *p,
                                    constant float *tables, int material, constant material_t *mat, intv mine,
-                                   floatv out[3])
+                                   floatv *out)
 {
     group_t g;
     constant float *d = mat->profile_scatter_distance_mm;
@@ -325,9 +345,9 @@ kernel void sss_burley_filter(SCATTER_PORTS, constant float *tables)
     intv id = rl_as_intv(rl_vload(0, stencil + v.at)), left = id != 0;
     if (!scatter_any(left))
         return;
-    floatv out[3];
-    for (int c = 0; c < 3; c++)
-        out[c] = rl_vload(0, diffuse + c * f->plane4 + v.at);
+    floatv out[SCATTER_OUT];
+    for (int c = 0; c < SCATTER_OUT; c++)
+        out[c] = c < 3 ? rl_vload(0, diffuse + c * f->plane4 + v.at) : (floatv)0.0f;
     while (scatter_any(left)) {
         int m = scatter_max_int(id & left);
         intv mine = left & (id == m);
@@ -337,6 +357,9 @@ kernel void sss_burley_filter(SCATTER_PORTS, constant float *tables)
     }
     for (int c = 0; c < 3; c++)
         rl_vstore(out[c], 0, filtered + c * f->plane4 + v.at);
+#if WANTS_energy
+    SCATTER_KEEP_LEDGER(out, f->plane4, v.at)
+#endif
 }
 
 kernel void sss_burley_area(SCATTER_PORTS, constant float *tables)
@@ -348,3 +371,10 @@ kernel void sss_burley_resolve(SCATTER_PORTS, constant float *tables)
 {
     scatter_resolve(filtered, lit, albedo, normal, stencil, color, f, materials);
 }
+
+#if WANTS_energy
+kernel void sss_burley_energy(SCATTER_PORTS, constant float *tables)
+{
+    SCATTER_ENERGY(RL_PHASE4);
+}
+#endif

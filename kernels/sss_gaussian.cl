@@ -24,7 +24,7 @@
     global const float *diffuse, global const float *lit, global const float *albedo,                        \
         global const float *normal, global const float *depth, global const uint *stencil,                   \
         global float *area, global float *line, global float *filtered, global float *color,                 \
-        constant params_t *p,                                                                                \
+        SCATTER_LEDGER constant params_t *p,                                                                 \
         constant frame_t *f, constant material_t *materials
 
 #if P_weighting == WEIGHTING_AREA
@@ -134,6 +134,18 @@ static inline floatv weight_of(const gaussian_t *gaussian, const lanes_t *l, con
                         (s->same | l->keep) & (s->far2 <= gaussian->reach2));
 }
 
+#if WANTS_energy
+/* The weight that a sample would have which is none. */
+static inline void reject(const gaussian_t *gaussian, const lanes_t *l, const sample_t *s, int dx, int dy,
+                          rejected_t *r)
+{
+    floatv w = scatter_keep(weight_exp2(s->far2 * gaussian->fall), ~s->same & (s->far2 <= gaussian->reach2));
+    intv inside = rl_insidev(l->in.f, l->x + dx, l->y + dy);
+    for (int c = 0; c < 3; c++)
+        scatter_reject(r, c, w, inside);
+}
+#endif
+
 static inline floatv light_of(const lanes_t *l, const sample_t *s, int c)
 {
     return scatter_keep(rl_load(l->in.light, s->at + c * l->in.f->plane), s->same);
@@ -163,16 +175,19 @@ static inline int2 place_in_strip(constant frame_t *f)
 
 /* The mean of the light along a row (ALONG_X) or a column. */
 enum { ALONG_X, ALONG_Y };
-static inline void mean_along(int axis, const lanes_t *l, const gaussian_t *gaussian, floatv mean[3])
+static inline void mean_along(int axis, const lanes_t *l, const gaussian_t *gaussian, floatv *mean)
 {
     constant frame_t *f = l->in.f;
     int n = pixels_of(gaussian->lateral, f->camera.focal[axis]);
     int first = -n, last = n;
-    if (!l->keep.s0) { /* nothing to see beyond the image */
+    if (!(l->keep.s0 | WANTS_energy)) { /* nothing to see beyond the image but for the ledger */
         first = max(first, axis == ALONG_X ? f->valid[0] - l->x - (RL_W - 1) : f->valid[1] - l->y);
         last = min(last, axis == ALONG_X ? f->valid[2] - 1 - l->x : f->valid[3] - 1 - l->y);
     }
     floatv w = 0.0f, c0 = 0.0f, c1 = 0.0f, c2 = 0.0f;
+#if WANTS_energy
+    rejected_t rejected = {{0.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 0.0f}};
+#endif
     for (int i = first; i <= last; i++) {
         sample_t s = axis == ALONG_X ? sample_of(l, i, 0) : sample_of(l, 0, i);
         floatv e = weight_of(gaussian, l, &s);
@@ -180,20 +195,57 @@ static inline void mean_along(int axis, const lanes_t *l, const gaussian_t *gaus
         c0 = fma(e, light_of(l, &s, 0), c0);
         c1 = fma(e, light_of(l, &s, 1), c1);
         c2 = fma(e, light_of(l, &s, 2), c2);
+#if WANTS_energy
+        reject(gaussian, l, &s, axis == ALONG_X ? i : 0, axis == ALONG_X ? 0 : i, &rejected);
+#endif
     }
     floatv per = 1.0f / w; /* the pixel itself has weight 1 */
     mean[0] = c0 * per;
     mean[1] = c1 * per;
     mean[2] = c2 * per;
+#if WANTS_energy
+    const floatv light[3] = {c0, c1, c2};
+    for (int c = 0; c < 3; c++)
+        scatter_account(mean, c, rl_load(l->in.light, rl_index(f, l->x, l->y) + c * f->plane), w, light[c],
+                        &rejected, l->keep, mean[c], mean[c], 0.0f);
+#endif
 }
 
+/* A Gaussian's share of the ledger joins that of the others, of the lanes `mine`; the planes begin with the first
+ * Gaussian's rows. */
+#if WANTS_energy
+#define LEDGER_PARAMETERS                                                                                    \
+    , global float *border, global float *off_screen, global float *clamped, global float *redistributed
+#define LEDGER_ARGUMENTS , border, off_screen, clamped, redistributed
+#define LEDGER_ADD(g, mat, mean, mine, at)                                                            \
+    for (int c = 0; c < 3; c++) {                                                                            \
+        global float *parts[4] = {border, off_screen, clamped, redistributed};                               \
+        for (int i = 0; i < 4; i++) {                                                                        \
+            global float *part = parts[i] + c * f->plane;                                                    \
+            floatv sum = rl_load(part, at);                                                                  \
+            floatv weight = (mat)->profile_gaussians_weight[3 * (g) + c];                                    \
+            rl_store(rl_select(sum, fma(weight, (mean)[3 + 3 * i + c], sum), mine), part, at);               \
+        }                                                                                                    \
+    }
+#else
+#define LEDGER_PARAMETERS
+#define LEDGER_ARGUMENTS
+#define LEDGER_ADD(g, mat, mean, mine, at)
+#endif
+
 /* Gaussian g along the rows, into `line`. */
-static inline void filter_rows(int g, const planes_t *in, global float *line, constant material_t *materials)
+static inline void filter_rows(int g, const planes_t *in, global float *line, constant material_t *materials
+                               LEDGER_PARAMETERS)
 {
     constant frame_t *f = in->f;
     int x = RL_W * (int)get_global_id(0), y = get_global_id(1), at = rl_index(f, x, y), found = 0;
     intv id = rl_as_intv(rl_load_id(in->stencil, at)), left = id != 0;
     floatv out[3] = {0.0f, 0.0f, 0.0f};
+#if WANTS_energy
+    const floatv nothing[SCATTER_OUT] = {0.0f};
+    if (!g)
+        SCATTER_KEEP_LEDGER(nothing, f->plane, at)
+#endif
     while (scatter_any(left)) {
         int m = scatter_max_int(id & left);
         intv mine = left & (id == m);
@@ -203,8 +255,9 @@ static inline void filter_rows(int g, const planes_t *in, global float *line, co
             continue;
         lanes_t l = gather_lanes(in, mat, m, mine, x, y);
         gaussian_t gaussian = gaussian_of(mat, g, &l);
-        floatv mean[3];
+        floatv mean[SCATTER_OUT];
         mean_along(ALONG_X, &l, &gaussian, mean);
+        LEDGER_ADD(g, mat, mean, mine, at)
         for (int c = 0; c < 3; c++)
             out[c] = rl_select(out[c], mean[c], mine);
         found = 1;
@@ -216,7 +269,7 @@ static inline void filter_rows(int g, const planes_t *in, global float *line, co
 /* Gaussian g of in->light, which went along the rows, along the columns; blended into `filtered`. The first
  * puts the unblurred share there. */
 static inline void filter_columns(int g, const planes_t *in, global const float *diffuse, global float *filtered,
-                                  constant material_t *materials)
+                                  constant material_t *materials LEDGER_PARAMETERS)
 {
     constant frame_t *f = in->f;
     int2 place = place_in_strip(f);
@@ -239,8 +292,9 @@ static inline void filter_columns(int g, const planes_t *in, global const float 
             continue;
         lanes_t l = gather_lanes(in, mat, m, mine, place.x, place.y);
         gaussian_t gaussian = gaussian_of(mat, g, &l);
-        floatv mean[3];
+        floatv mean[SCATTER_OUT];
         mean_along(ALONG_Y, &l, &gaussian, mean);
+        LEDGER_ADD(g, mat, mean, mine, at)
         for (int c = 0; c < 3; c++) {
             floatv before = g ? out[c] : out[c] * unblurred(mat, c);
             floatv weight = mat->profile_gaussians_weight[3 * g + c];
@@ -256,12 +310,12 @@ static inline void filter_columns(int g, const planes_t *in, global const float 
     kernel void sss_gaussian_rows_##g(GAUSSIAN_PORTS)                                                        \
     {                                                                                                        \
         planes_t in = {diffuse, depth, area, stencil, f};                                                    \
-        filter_rows(g, &in, line, materials);                                                                \
+        filter_rows(g, &in, line, materials LEDGER_ARGUMENTS);                                                              \
     }                                                                                                        \
     kernel void sss_gaussian_columns_##g(GAUSSIAN_PORTS)                                                     \
     {                                                                                                        \
         planes_t in = {line, depth, area, stencil, f};                                                       \
-        filter_columns(g, &in, diffuse, filtered, materials);                                                \
+        filter_columns(g, &in, diffuse, filtered, materials LEDGER_ARGUMENTS);                                              \
     }
 GAUSSIAN(0)
 GAUSSIAN(1)
@@ -271,12 +325,18 @@ GAUSSIAN(3)
 #else
 
 /* All Gaussians of a material over the disk of the widest. */
-static inline void mean_around(const lanes_t *l, constant material_t *mat, floatv out[3])
+static inline void mean_around(const lanes_t *l, constant material_t *mat, floatv *out)
 {
     constant frame_t *f = l->in.f;
     gaussian_t gaussians[MOST_GAUSSIANS];
     floatv w[MOST_GAUSSIANS], sum[3 * MOST_GAUSSIANS];
     float lateral = 0.0f;
+#if WANTS_energy
+    rejected_t rejected[MOST_GAUSSIANS];
+    const floatv own[3] = {out[0], out[1], out[2]};
+    for (int i = 0; i < 3 * MOST_GAUSSIANS; i++)
+        rejected[i / 3].border[i % 3] = rejected[i / 3].off_screen[i % 3] = 0.0f;
+#endif
     for (int g = 0; g < MOST_GAUSSIANS; g++) {
         for (int c = 0; c < 3; c++)
             sum[3 * g + c] = 0.0f;
@@ -285,7 +345,7 @@ static inline void mean_around(const lanes_t *l, constant material_t *mat, float
         gaussians[g].lateral = g < mat->profile_gaussians_n ? gaussians[g].lateral : -1.0f;
         lateral = fmax(lateral, gaussians[g].lateral);
     }
-    int clip = !l->keep.s0; /* nothing to see beyond the image */
+    int clip = !(l->keep.s0 | WANTS_energy); /* nothing to see beyond the image but for the ledger */
     int rows = pixels_of(lateral, f->camera.focal[1]);
     for (int dy = clip ? max(-rows, f->valid[1] - l->y) : -rows;
          dy <= (clip ? min(rows, f->valid[3] - 1 - l->y) : rows); dy++) {
@@ -302,6 +362,9 @@ static inline void mean_around(const lanes_t *l, constant material_t *mat, float
                     continue;
                 floatv e = weight_of(&gaussians[g], l, &s);
                 w[g] += e;
+#if WANTS_energy
+                reject(&gaussians[g], l, &s, dx, dy, &rejected[g]);
+#endif
                 sum[3 * g] = fma(e, c0, sum[3 * g]);
                 sum[3 * g + 1] = fma(e, c1, sum[3 * g + 1]);
                 sum[3 * g + 2] = fma(e, c2, sum[3 * g + 2]);
@@ -313,6 +376,15 @@ static inline void mean_around(const lanes_t *l, constant material_t *mat, float
     for (int g = 0; g < mat->profile_gaussians_n; g++)
         for (int c = 0; c < 3; c++)
             out[c] = fma((floatv)mat->profile_gaussians_weight[3 * g + c], sum[3 * g + c] / w[g], out[c]);
+#if WANTS_energy
+    for (int g = 0; g < mat->profile_gaussians_n; g++)
+        for (int c = 0; c < 3; c++) {
+            floatv one[SCATTER_OUT], mean = sum[3 * g + c] / w[g];
+            scatter_account(one, c, own[c], w[g], sum[3 * g + c], &rejected[g], l->keep, mean, mean, 0.0f);
+            for (int i = 3 + c; i < SCATTER_OUT; i += 3)
+                out[i] = fma((floatv)mat->profile_gaussians_weight[3 * g + c], one[i], out[i]);
+        }
+#endif
 }
 
 kernel void sss_gaussian_disk(GAUSSIAN_PORTS)
@@ -321,9 +393,9 @@ kernel void sss_gaussian_disk(GAUSSIAN_PORTS)
     int2 place = place_in_strip(f);
     int at = rl_index(f, place.x, place.y);
     intv id = rl_as_intv(rl_load_id(stencil, at)), left = id != 0;
-    floatv out[3];
-    for (int c = 0; c < 3; c++)
-        out[c] = rl_load(diffuse, at + c * f->plane);
+    floatv out[SCATTER_OUT];
+    for (int c = 0; c < SCATTER_OUT; c++)
+        out[c] = c < 3 ? rl_load(diffuse, at + c * f->plane) : (floatv)0.0f;
     while (scatter_any(left)) {
         int m = scatter_max_int(id & left);
         intv mine = left & (id == m);
@@ -332,13 +404,18 @@ kernel void sss_gaussian_disk(GAUSSIAN_PORTS)
         if (!mat->has_profile || !mat->profile_gaussians_n)
             continue;
         lanes_t l = gather_lanes(&in, mat, m, mine, place.x, place.y);
-        floatv all[3] = {out[0], out[1], out[2]};
+        floatv all[SCATTER_OUT];
+        for (int c = 0; c < SCATTER_OUT; c++)
+            all[c] = c < 3 ? out[c] : (floatv)0.0f;
         mean_around(&l, mat, all);
-        for (int c = 0; c < 3; c++)
+        for (int c = 0; c < SCATTER_OUT; c++)
             out[c] = rl_select(out[c], all[c], mine);
     }
     for (int c = 0; c < 3; c++)
         rl_store(out[c], filtered, at + c * f->plane);
+#if WANTS_energy
+    SCATTER_KEEP_LEDGER(out, f->plane, at)
+#endif
 }
 
 #endif
@@ -368,3 +445,10 @@ kernel void sss_gaussian_resolve(GAUSSIAN_PORTS)
 {
     scatter_resolve_from(RL_LINEAR, filtered, lit, albedo, normal, stencil, color, f, materials);
 }
+
+#if WANTS_energy
+kernel void sss_gaussian_energy(GAUSSIAN_PORTS)
+{
+    SCATTER_ENERGY(RL_LINEAR);
+}
+#endif

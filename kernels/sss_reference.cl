@@ -6,7 +6,17 @@
 typedef struct sums_t {
     floatv w[3], c[3]; /* weights; weights times light */
     floatv p[3];       /* weighting: surface: weights on the tangent plane */
+#if WANTS_energy
+    rejected_t rejected;
+#endif
 } sums_t;
+
+#define NO_LIGHT {0.0f, 0.0f, 0.0f}
+#if WANTS_energy
+#define NO_SUMS {NO_LIGHT, NO_LIGHT, NO_LIGHT, {NO_LIGHT, NO_LIGHT}}
+#else
+#define NO_SUMS {NO_LIGHT, NO_LIGHT, NO_LIGHT}
+#endif
 
 /* What is constant for the pixels of one vector and one material. */
 typedef struct centre_t {
@@ -78,11 +88,29 @@ static inline void weigh(const centre_t *at, int dx, int dy, floatv r2, floatv d
         burley(fma(dz, dz, r2), at->d, w);
 }
 
+/* The weights that samples would have which are none, for the ledger. */
+static inline void reject(const inputs_t *in, const centre_t *at, int dx, int dy, floatv r2, floatv dz,
+                          intv none, sums_t *s)
+{
+#if WANTS_energy
+    floatv w[3], area = 1.0f;
+    if (!scatter_any(none))
+        return;
+#if P_weighting != WEIGHTING_PLAIN
+    area = rl_vload(0, in->area + at->v.at);
+#endif
+    weigh(at, dx, dy, r2, dz, w);
+    intv inside = scatter_inside(in->f, &at->v, dx, dy);
+    for (int c = 0; c < 3; c++)
+        scatter_reject(&s->rejected, c, scatter_keep(w[c] * area, none), inside);
+#endif
+}
+
 /* The pixels (dx, dy) away join the sums of the lanes in `mine`. */
 static inline void gather(const inputs_t *in, const centre_t *at, int dx, int dy, intv mine, sums_t *s)
 {
     float x = (float)dx * at->px, y = (float)dy * at->py;
-    floatv z2 = at->z * at->z, r2 = z2 * (x * x + y * y), disk2 = r2;
+    floatv z2 = at->z * at->z, r2 = z2 * (x * x + y * y), disk2 = r2, flat = 0.0f;
 #if P_orientation == ORIENTATION_TANGENT
     floatv rise = at->tilt_x * x + at->tilt_y * y;
     disk2 += z2 * rise * rise;
@@ -92,8 +120,10 @@ static inline void gather(const inputs_t *in, const centre_t *at, int dx, int dy
     intv same = near & (id == at->material), counts = near & (same | at->keep);
     floatv other = rl_vload(0, in->depth + i), dz = scatter_keep(other - at->z, same), w[3];
 #if P_weighting == WEIGHTING_SURFACE
-    floatv flat = at->plane.x * (float)dx + at->plane.y * (float)dy, p[3];
+    flat = at->plane.x * (float)dx + at->plane.y * (float)dy;
+    floatv p[3];
     intv away = scatter_turned_away(in, &at->v, dx, dy, id, other, at->z + flat);
+    reject(in, at, dx, dy, r2, flat, near & ~same, s);
     intv planar = near & (same | at->keep | away);
     if (!scatter_any(planar))
         return;
@@ -103,6 +133,7 @@ static inline void gather(const inputs_t *in, const centre_t *at, int dx, int dy
     for (int c = 0; c < 3; c++)
         s->p[c] += scatter_keep(p[c] * own, planar);
 #else
+    reject(in, at, dx, dy, r2, flat, near & ~same, s);
     if (!scatter_any(counts))
         return;
 #endif
@@ -121,7 +152,7 @@ static inline void gather(const inputs_t *in, const centre_t *at, int dx, int dy
 }
 
 static inline void filter_material(const inputs_t *in, const vector_t *v, int material,
-                                   constant material_t *mat, intv mine, floatv out[3])
+                                   constant material_t *mat, intv mine, floatv *out)
 {
     centre_t at;
     at.v = *v;
@@ -142,19 +173,21 @@ static inline void filter_material(const inputs_t *in, const vector_t *v, int ma
 #if P_weighting == WEIGHTING_SURFACE
     at.plane = scatter_plane(in, v, at.z);
 #endif
-    sums_t total = {{0.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 0.0f}};
+    sums_t total = NO_SUMS;
     for (int dy = -ry; dy <= ry; dy++) {
         float y = (float)dy * at.py * nearest;
         int rx = (int)fmin(sqrt(fmax(at.reach * at.reach - y * y, 0.0f)) / (nearest * at.px), 16384.0f) + 1;
-        sums_t row = {{0.0f, 0.0f, 0.0f},
-                      {0.0f, 0.0f, 0.0f},
-                      {0.0f, 0.0f, 0.0f}}; /* rows first: less is lost to rounding */
+        sums_t row = NO_SUMS; /* rows first: less is lost to rounding */
         for (int dx = -rx; dx <= rx; dx++)
             gather(in, &at, dx, dy, mine, &row);
         for (int c = 0; c < 3; c++) {
             total.w[c] += row.w[c];
             total.c[c] += row.c[c];
             total.p[c] += row.p[c];
+#if WANTS_energy
+            total.rejected.border[c] += row.rejected.border[c];
+            total.rejected.off_screen[c] += row.rejected.off_screen[c];
+#endif
         }
     }
     for (int c = 0; c < 3; c++) {
@@ -162,7 +195,15 @@ static inline void filter_material(const inputs_t *in, const vector_t *v, int ma
 #if P_weighting == WEIGHTING_SURFACE
         over = fma(at.plane.cosine, 1.0f / total.p[c] - over, over);
 #endif
+#if WANTS_energy
+        floatv all[SCATTER_OUT], own = out[c];
+#endif
         out[c] = rl_select(out[c], total.c[c] * over, mine & (total.w[c] > 0.0f));
+#if WANTS_energy
+        scatter_account(all, c, own, total.w[c], total.c[c], &total.rejected, at.keep, out[c], out[c], 0.0f);
+        for (int i = 3 + c; i < SCATTER_OUT; i += 3)
+            out[i] = rl_select(out[i], all[i], mine);
+#endif
     }
 }
 
@@ -171,9 +212,9 @@ kernel void sss_reference_filter(SCATTER_PORTS)
     inputs_t in = {diffuse, depth, area, stencil, f};
     vector_t v = scatter_vector(f);
     intv id = rl_as_intv(rl_vload(0, stencil + v.at)), left = id != 0;
-    floatv out[3];
-    for (int c = 0; c < 3; c++)
-        out[c] = rl_vload(0, diffuse + c * f->plane4 + v.at);
+    floatv out[SCATTER_OUT];
+    for (int c = 0; c < SCATTER_OUT; c++)
+        out[c] = c < 3 ? rl_vload(0, diffuse + c * f->plane4 + v.at) : (floatv)0.0f;
     while (scatter_any(left)) {
         int m = scatter_max_int(id & left);
         intv mine = id == m;
@@ -183,6 +224,9 @@ kernel void sss_reference_filter(SCATTER_PORTS)
     }
     for (int c = 0; c < 3; c++)
         rl_vstore(out[c], 0, filtered + c * f->plane4 + v.at);
+#if WANTS_energy
+    SCATTER_KEEP_LEDGER(out, f->plane4, v.at)
+#endif
 }
 
 kernel void sss_reference_area(SCATTER_PORTS)
@@ -196,3 +240,10 @@ kernel void sss_reference_resolve(SCATTER_PORTS)
 {
     scatter_resolve(filtered, lit, albedo, normal, stencil, color, f, materials);
 }
+
+#if WANTS_energy
+kernel void sss_reference_energy(SCATTER_PORTS)
+{
+    SCATTER_ENERGY(RL_PHASE4);
+}
+#endif

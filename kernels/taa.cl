@@ -175,10 +175,22 @@ static inline uintv displacement_key(constant frame_t *f, int x, int y, floatv d
     return rl_as_uintv(((ix + 32768) << 16 | (iy + 32768)) & inside);
 }
 
-kernel void taa(global const float *color, global const float *depth, global const float *motion,
-                global const uint *stencil, global const float *last_color, global const float *last_depth,
-                global const uint *last_stencil, global const float *last_count, global float *out_color,
-                global float *out_count, constant params_t *p, constant frame_t *f, constant material_t *materials)
+#if WANTS_energy
+#define TAA_LEDGER global float *clamped, global float *redistributed, global float *energy,
+#define TAA_PAST   6 /* the history's colour; for the ledger the same before it was clamped */
+#else
+#define TAA_LEDGER
+#define TAA_PAST 3
+#endif
+
+#define TAA_PORTS                                                                                            \
+    global const float *color, global const float *depth, global const float *motion,                        \
+        global const uint *stencil, global const float *last_color, global const float *last_depth,          \
+        global const uint *last_stencil, global const float *last_count, global float *out_color,            \
+        global float *out_count, TAA_LEDGER constant params_t *p, constant frame_t *f,                       \
+        constant material_t *materials
+
+kernel void taa(TAA_PORTS)
 {
     int x = RL_W * (int)get_global_id(0), y = (int)get_global_id(1), at = rl_index(f, x, y);
     history_t h = {last_color, last_depth, last_count, last_stencil};
@@ -186,6 +198,9 @@ kernel void taa(global const float *color, global const float *depth, global con
     for (int c = 0; c < 3; c++)
         own[c] = rl_load(color, at + c * f->plane);
     floatv result[3] = {own[0], own[1], own[2]};
+#if WANTS_energy
+    floatv cut[3] = {0.0f, 0.0f, 0.0f}, brought[3] = {0.0f, 0.0f, 0.0f};
+#endif
     if (f->history && rl_any(rl_insidev(f, x, y))) {
         place_t place;
         box_t box;
@@ -206,7 +221,7 @@ kernel void taa(global const float *color, global const float *depth, global con
             int hx = x + (int)(now >> 16) - 32768, hy = y + (int)(now & 65535) - 32768;
             int whole = !rl_any(mask & ((tx != 0.0f) | (ty != 0.0f)));
             mask &= same_surface(f, &h, id, &place, mask, hx, hy, right, below, whole);
-            floatv past[3], n = nearest_count(f, &h, hx, hy, right, below, whole);
+            floatv past[TAA_PAST], n = nearest_count(f, &h, hx, hy, right, below, whole);
             mask &= ~((n < 0.0f) & (place.alone | (place.behind & ~place.follows)));
             if (!rl_any(mask))
                 continue;
@@ -216,12 +231,22 @@ kernel void taa(global const float *color, global const float *depth, global con
                     past[c] = tap(h.color + c * f->plane, f, hx, hy);
             else
                 resample(f, h.color, hx, hy, tx, ty, past);
+#if WANTS_energy
+            for (int c = 0; whole && c < 3; c++)
+                past[3 + c] = past[c];
+#endif
             clip_to_box(&box, own, past);
             floatv alpha = fmax(1.0f / (1.0f + n), p->blend);
             floatv w = alpha * firefly_weight(&box, own), w_past = (1.0f - alpha) * firefly_weight(&box, past);
             floatv share = w / (w + w_past);
             for (int c = 0; c < 3; c++)
                 result[c] = rl_select(result[c], fma(own[c] - past[c], share, past[c]), mask);
+#if WANTS_energy
+            for (int c = 0; c < 3; c++) {
+                cut[c] = rl_select(cut[c], (past[3 + c] - past[c]) * (1.0f - share), mask);
+                brought[c] = rl_select(brought[c], (past[3 + c] - own[c]) * (1.0f - share), mask);
+            }
+#endif
             n = fmin(n + 1.0f, COUNT_MAX);
             count = rl_select(count, rl_select(n, -n, place.follows), mask);
         }
@@ -229,4 +254,34 @@ kernel void taa(global const float *color, global const float *depth, global con
     for (int c = 0; c < 3; c++)
         rl_store(result[c], out_color, at + c * f->plane);
     rl_store(count, out_count, at);
+#if WANTS_energy
+    for (int c = 0; c < 3; c++) {
+        rl_store(cut[c], clamped, at + c * f->plane);
+        rl_store(brought[c], redistributed, at + c * f->plane);
+    }
+#endif
 }
+
+#if WANTS_energy
+kernel void taa_energy(TAA_PORTS)
+{
+    band_t band = energy_band(energy, f);
+    ENERGY_EACH_VECTOR(f, band, x, y)
+    {
+        int at = rl_index(f, x, y);
+        floatv values[ENERGY_PIXELS];
+        uintv id = 0;
+#if HAS_stencil
+        id = rl_load_id(stencil, at);
+#endif
+        energy_clear(values);
+        for (int c = 0; c < 3; c++) {
+            values[ENERGY_IN + c] = rl_load(color, at + c * f->plane);
+            values[ENERGY_OUT + c] = rl_load(out_color, at + c * f->plane);
+            values[ENERGY_CLAMPED + c] = rl_load(clamped, at + c * f->plane);
+            values[ENERGY_REDISTRIBUTED + c] = rl_load(redistributed, at + c * f->plane);
+        }
+        energy_post_all(&band, f, x, y, id, values);
+    }
+}
+#endif

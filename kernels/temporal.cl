@@ -147,7 +147,8 @@ static inline void spline36(floatv t, floatv *w)
     w[5] = u * fma(u, fma(u, (floatv)(1.0f / 11), -45.0f / 209), 26.0f / 209);
 }
 
-/* History colour between pixels, 36 loads a channel. Ringing must not make light negative. */
+/* History colour between pixels, 36 loads a channel. Ringing must not make light negative. For the ledger `out` has three
+ * channels more: the same with it. */
 static inline void resample(constant frame_t *f, global const float *color, int x, int y, floatv tx, floatv ty,
                             floatv *out)
 {
@@ -168,5 +169,8 @@ static inline void resample(constant frame_t *f, global const float *color, int 
             sum = fma(wy[j], row, sum);
         }
         out[c] = fmax(sum, least);
+#if WANTS_energy
+        out[3 + c] = sum;
+#endif
     }
 }

@@ -12,6 +12,7 @@
 #include <stddef.h>
 
 #include "graph/model/pass.h"
+#include "passes/shading_rows.h"
 
 #ifdef __cplusplus
 extern "C" {

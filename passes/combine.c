@@ -13,17 +13,23 @@ static const rl_port ports[] = {
     {"depth", RL_READ, RL_SCALAR, .help = "planar, metres"},
     {"stencil", RL_READ, RL_ID, .help = "material"},
     {"color", RL_WRITE, RL_RGB, .help = "radiance towards the camera", .any_layout = true},
+    RL_PORT_ENERGY,
 };
 
-static const rl_step steps[] = {{"combine", .domain = RL_EVERY_VECTOR}};
+static const rl_step steps[] = {
+    {"combine", .domain = RL_EVERY_VECTOR},
+    {"combine_energy", .domain = RL_EVERY_BAND, .with = "energy"},
+};
 
 const rl_pass rl_pass_combine = {
     .name = "combine",
     .help = "lit and diffuse together, without scattering",
     .source = "Golubev 2018",
     .kernel = "combine.cl",
+    .kernel_prelude = "energy.cl",
     .profile_keys = RL_ARRAY(profile_keys),
     .shading_keys = RL_ARRAY(shading_keys),
     .ports = RL_ARRAY(ports),
     .steps = RL_ARRAY(steps),
+    .conserves = true,
 };

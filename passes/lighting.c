@@ -94,6 +94,7 @@ static const rl_port ports[] = {
      .optional = true},
     {"diffuse", RL_WRITE, RL_RGB, .help = "radiance that entered a subsurface material", .any_layout = true},
     {"lit", RL_WRITE, RL_RGB, .help = "all other radiance, complete"},
+    RL_PORT_ENERGY,
 };
 
 /* The kernel's only table, the same for all pipelines. */
@@ -108,7 +109,10 @@ static rl_code lighting_tables(const rl_pass_input *in, rl_arena *arena, rl_tabl
     return RL_OK;
 }
 
-static const rl_step steps[] = {{"lighting", .domain = RL_EVERY_VECTOR}};
+static const rl_step steps[] = {
+    {"lighting", .domain = RL_EVERY_VECTOR},
+    {"lighting_energy", .domain = RL_EVERY_BAND, .with = "energy"},
+};
 
 /* With three lights; how many there are is not known here. */
 static double cost(const void *p)
@@ -117,12 +121,19 @@ static double cost(const void *p)
     return 26;
 }
 
+static bool stochastic(const void *values, bool march)
+{
+    const lighting_params *p = values;
+    return march && p->shadow_jitter;
+}
+
 const rl_pass rl_pass_lighting = {
     .name = "lighting",
     .help = "direct, area and ambient light: diffuse transmission, specular reflection, translucency",
     .source = "Golubev 2018; Helix; Walter 2007; Heitz 2014; Heitz et al. 2016",
     .kernel = "lighting.cl",
-    .kernel_prelude = "sg.cl surface.cl sg_shade.cl screen_shadow.cl ltc.cl area.cl light_tables.cl",
+    .kernel_prelude =
+        "energy.cl sg.cl surface.cl sg_shade.cl screen_shadow.cl ltc.cl area.cl light_tables.cl",
     .params = RL_ARRAY(params),
     .params_size = sizeof(lighting_params),
     .profile_keys = RL_ARRAY(profile_keys),
@@ -134,5 +145,6 @@ const rl_pass rl_pass_lighting = {
     .ambient = true,
     .light_tables = true,
     .tables = lighting_tables,
+    .stochastic = stochastic,
     .cost = cost,
 };

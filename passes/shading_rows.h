@@ -47,4 +47,24 @@ extern const rl_form rl_scatter_forms[RL_SCATTER_FORMS];
            "where the way out is applied: behind the filter, or before it as in the talk",                   \
            .source = "Golubev 2018")
 
+/* The ports that scattering filters have for the ledger of energy; layout_ is that of what they filter. */
+#define RL_SCATTER_LEDGER(layout_)                                                                           \
+    {"border",                                                                                               \
+     RL_SCRATCH,                                                                                             \
+     RL_RGB,                                                                                                 \
+     .help = "light lost to what is of another material",                                                    \
+     .layout = (layout_),                                                                                    \
+     .with = "energy"},                                                                                      \
+        {"off_screen",        RL_SCRATCH,      RL_RGB, .help = "light lost beyond the image",                \
+         .layout = (layout_), .with = "energy"},                                                             \
+        {"clamped",           RL_SCRATCH,      RL_RGB, .help = "light that clamps cut off",                  \
+         .layout = (layout_), .with = "energy"},                                                             \
+        {"redistributed",     RL_SCRATCH,      RL_RGB, .help = "light given back for what is lost",          \
+         .layout = (layout_), .with = "energy"},                                                             \
+        RL_PORT_ENERGY
+#define RL_PORT_ENERGY                                                                                       \
+    {                                                                                                        \
+        "energy", RL_REDUCTION, RL_SUMS, .help = "the ledger: sums of each material"                         \
+    }
+
 #endif

@@ -37,12 +37,14 @@ static const rl_port ports[] = {
     {"area", RL_SCRATCH, RL_SCALAR, .help = "surface that a pixel sees", .layout = RL_PHASE4},
     {"filtered", RL_SCRATCH, RL_RGB, .help = "scattered radiance below the surface", .layout = RL_PHASE4},
     {"color", RL_WRITE, RL_RGB, .help = "radiance, scene-linear"},
+    RL_SCATTER_LEDGER(RL_PHASE4),
 };
 
 static const rl_step steps[] = {
     {"sss_burley_area", .domain = RL_EVERY_PHASE},
     {"sss_burley_filter", .domain = RL_EVERY_PHASE},
     {"sss_burley_resolve", .domain = RL_EVERY_VECTOR},
+    {"sss_burley_energy", .domain = RL_EVERY_BAND, .with = "energy"},
 };
 
 /* As kernels/sss_burley.cl reads it: 256 directions (cos, sin), then the patterns for `taps`, or with `auto`
@@ -98,12 +100,19 @@ static double cost(const void *of)
     return 45 + 2.0 * (p->taps > 0 ? p->taps : 30);
 }
 
+static bool stochastic(const void *values, bool march)
+{
+    const sss_burley_params *p = values;
+    (void)march;
+    return p->rotation != 0; /* none */
+}
+
 const rl_pass rl_pass_sss_burley = {
     .name = "sss_burley",
     .help = "subsurface scattering with Burley's profile, a few importance-sampled taps a pixel",
     .source = "Golubev, Efficient screen-space subsurface scattering, SIGGRAPH 2018",
     .kernel = "sss_burley.cl",
-    .kernel_prelude = "scatter.cl",
+    .kernel_prelude = "energy.cl scatter.cl",
     .params = RL_ARRAY(params),
     .params_size = sizeof(sss_burley_params),
     .profile_keys = RL_ARRAY(rl_scatter_profile_rows),
@@ -111,5 +120,7 @@ const rl_pass rl_pass_sss_burley = {
     .ports = RL_ARRAY(ports),
     .steps = RL_ARRAY(steps),
     .tables = tables,
+    .stochastic = stochastic,
     .cost = cost,
+    .conserves = true,
 };

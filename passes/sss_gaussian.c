@@ -47,6 +47,7 @@ static const rl_port ports[] = {
     {"line", RL_SCRATCH, RL_RGB, .help = "one Gaussian along the rows"},
     {"filtered", RL_SCRATCH, RL_RGB, .help = "scattered radiance below the surface"},
     {"color", RL_WRITE, RL_RGB, .help = "radiance, scene-linear"},
+    RL_SCATTER_LEDGER(RL_LINEAR),
 };
 
 #define LINES(g)                                                                                             \
@@ -63,6 +64,7 @@ static const rl_step steps[] = {
     LINES(3),
     {"sss_gaussian_disk", .domain = RL_EVERY_VECTOR, .when = "separable", .is = 0},
     {"sss_gaussian_resolve", .domain = RL_EVERY_VECTOR},
+    {"sss_gaussian_energy", .domain = RL_EVERY_BAND, .with = "energy"},
 };
 
 /* Follows the size of the profile in pixels, which is not known here: of skin, 3 mm at 2 px a mm. */
@@ -76,12 +78,13 @@ const rl_pass rl_pass_sss_gaussian = {
     .help = "subsurface scattering with a mixture of Gaussians",
     .source = "Helix, Deferred subsurface scattering using compute shaders; Jimenez 2009; d'Eon 2007",
     .kernel = "sss_gaussian.cl",
-    .kernel_prelude = "scatter.cl",
+    .kernel_prelude = "energy.cl scatter.cl",
     .params = RL_ARRAY(params),
     .params_size = sizeof(sss_gaussian_params),
     .profile_keys = RL_ARRAY(profile_keys),
     .shading_keys = RL_ARRAY(shading_keys),
     .ports = RL_ARRAY(ports),
     .steps = RL_ARRAY(steps),
+    .conserves = true,
     .cost = cost,
 };

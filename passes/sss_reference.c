@@ -28,12 +28,14 @@ static const rl_port ports[] = {
     {"area", RL_SCRATCH, RL_SCALAR, .help = "surface that a pixel sees", .layout = RL_PHASE4},
     {"filtered", RL_SCRATCH, RL_RGB, .help = "scattered radiance below the surface", .layout = RL_PHASE4},
     {"color", RL_WRITE, RL_RGB, .help = "radiance, scene-linear"},
+    RL_SCATTER_LEDGER(RL_PHASE4),
 };
 
 static const rl_step steps[] = {
     {"sss_reference_area", .domain = RL_EVERY_PHASE},
     {"sss_reference_filter", .domain = RL_EVERY_PHASE},
     {"sss_reference_resolve", .domain = RL_EVERY_VECTOR},
+    {"sss_reference_energy", .domain = RL_EVERY_BAND, .with = "energy"},
 };
 
 /* Follows the square of the profile's size in pixels: of skin, 3 mm at 2 px a mm. */
@@ -48,12 +50,13 @@ const rl_pass rl_pass_sss_reference = {
     .help = "subsurface scattering with Burley's profile, summed over every pixel in reach",
     .source = "Golubev 2018; Christensen and Burley 2015",
     .kernel = "sss_reference.cl",
-    .kernel_prelude = "scatter.cl",
+    .kernel_prelude = "energy.cl scatter.cl",
     .params = RL_ARRAY(params),
     .params_size = sizeof(sss_reference_params),
     .profile_keys = RL_ARRAY(rl_scatter_profile_rows),
     .shading_keys = RL_ARRAY(rl_scatter_shading_rows),
     .ports = RL_ARRAY(ports),
     .steps = RL_ARRAY(steps),
+    .conserves = true,
     .cost = cost,
 };

@@ -4,6 +4,7 @@
  * Variance clipping: Salvi 2016. Closest motion, luminance weights: Karis 2014. Survey of the rest: Yang et
  * al. 2020. */
 #include "graph/model/pass.h"
+#include "passes/shading_rows.h"
 
 typedef struct taa_params {
     float blend;
@@ -34,9 +35,15 @@ static const rl_port ports[] = {
     {"color", RL_WRITE, RL_RGB, .help = "anti-aliased, scene-linear"},
     {"count", RL_WRITE, RL_SCALAR,
      .help = "frames in the pixel, this one included; negative: it follows an edge in front"},
+    {"clamped", RL_SCRATCH, RL_RGB, .help = "light that the clip takes", .with = "energy"},
+    {"redistributed", RL_SCRATCH, RL_RGB, .help = "light that the history adds", .with = "energy"},
+    RL_PORT_ENERGY,
 };
 
-static const rl_step steps[] = {{"taa", .domain = RL_EVERY_VECTOR}};
+static const rl_step steps[] = {
+    {"taa", .domain = RL_EVERY_VECTOR},
+    {"taa_energy", .domain = RL_EVERY_BAND, .with = "energy"},
+};
 
 static double least_share(const void *values)
 {
@@ -54,7 +61,7 @@ const rl_pass rl_pass_taa = {
     .help = "temporal anti-aliasing with variance clipping",
     .source = "Salvi 2016; Karis 2014; Yang et al. 2020",
     .kernel = "taa.cl",
-    .kernel_prelude = "temporal.cl",
+    .kernel_prelude = "energy.cl temporal.cl",
     .params = RL_ARRAY(params),
     .params_size = sizeof(taa_params),
     .ports = RL_ARRAY(ports),

@@ -19,6 +19,7 @@ struct cl_session {
     cl_device_id device;
     cl_context context;
     cl_command_queue queue;
+    bool part; /* of a device */
     struct {
         char *text;
         cl_program program;
@@ -57,6 +58,7 @@ cl_session *cl_open(int threads)
     if (!s)
         return NULL;
     cl_int code;
+    s->part = threads > 0;
     s->device = device;
     s->context = clCreateContext(NULL, 1, &device, NULL, NULL, &code);
     if (!failed("clCreateContext", code))
@@ -66,21 +68,37 @@ cl_session *cl_open(int threads)
     return s;
 }
 
-void cl_close(cl_session **s)
+/* PoCL 3.1: a worker lets go of the last event after those who wait for it have been told, and needs the part
+ * of a device that it is of; so such parts are kept until the program ends. */
+static struct {
+    cl_device_id device;
+    cl_context context;
+    cl_command_queue queue;
+} parts[16];
+static int n_parts;
+
+void cl_close(cl_session **session)
 {
-    if (!*s)
+    cl_session *s = *session;
+    *session = NULL;
+    if (!s)
         return;
-    for (int i = 0; i < (*s)->n_kept; i++) {
-        clReleaseProgram((*s)->kept[i].program);
-        rl_free((*s)->kept[i].text);
+    for (int i = 0; i < s->n_kept; i++) {
+        clReleaseProgram(s->kept[i].program);
+        rl_free(s->kept[i].text);
     }
-    if ((*s)->queue)
-        clReleaseCommandQueue((*s)->queue);
-    if ((*s)->context)
-        clReleaseContext((*s)->context);
-    clReleaseDevice((*s)->device);
-    rl_free(*s);
-    *s = NULL;
+    if (s->part && n_parts < 16) {
+        parts[n_parts].device = s->device;
+        parts[n_parts].context = s->context;
+        parts[n_parts++].queue = s->queue;
+    } else {
+        if (s->queue)
+            clReleaseCommandQueue(s->queue);
+        if (s->context)
+            clReleaseContext(s->context);
+        clReleaseDevice(s->device);
+    }
+    rl_free(s);
 }
 
 /* ---- programs ---- */
@@ -155,12 +173,21 @@ static bool program_text(const cl_job *job, rl_str *s)
     for (size_t i = 0; i < pass->ports.n; i++) {
         const rl_port *port = &pass->ports.rows[i];
         const cl_image *image = cl_image_of(job, port);
-        rl_str_printf(s, "#define HAS_%s %d\n#define LAYOUT_%s %d\n", port->name, image && image->read,
-                      port->name, port->layout);
+        if (port->role == RL_REDUCTION)
+            rl_str_printf(s, "#define WANTS_%s %d\n", port->name, cl_has_port(job, port));
+        if (port->role == RL_READ)
+            rl_str_printf(s, "#define HAS_%s %d\n", port->name, image && image->read);
+        if (port->role == RL_WRITE)
+            rl_str_printf(s, "#define LAYOUT_%s %d\n", port->name, port->layout);
     }
     ok = ok && add_file(s, "common.cl");
-    if (pass->kernel_prelude)
-        ok = ok && add_file(s, pass->kernel_prelude);
+    for (const char *names = pass->kernel_prelude; ok && names && *names;) {
+        char name[64];
+        int n = (int)strcspn(names, " ");
+        snprintf(name, sizeof name, "%.*s", n, names);
+        ok = add_file(s, name);
+        names += n + (int)strspn(names + n, " ");
+    }
     return ok && add_file(s, pass->kernel) && !s->failed;
 }
 
@@ -236,6 +263,8 @@ static double run_step(cl_session *s, const cl_job *job, cl_program program, con
         ms = run_kernel(s, kernel, 3, (size_t[]){16, columns / (4 * width), rows / 4}, (size_t[]){16, 1, 1});
     else if (step->domain == RL_EVERY_VECTOR)
         ms = run_kernel(s, kernel, 2, (size_t[]){columns / width, rows}, (size_t[]){4, 1});
+    else if (step->domain == RL_EVERY_BAND)
+        ms = run_kernel(s, kernel, 1, (size_t[]){RL_BANDS}, (size_t[]){1});
     else
         ms = run_kernel(s, kernel, 2, (size_t[]){columns, rows}, (size_t[]){64, 1});
 done:
@@ -247,7 +276,9 @@ static bool run_steps(cl_session *s, const cl_job *job, cl_program program, cons
 {
     const rl_pass *pass = job->pass;
     for (size_t i = 0; i < pass->steps.n; i++) {
-        if (!rl_step_runs(pass, &pass->steps.rows[i], job->params))
+        const char *with = pass->steps.rows[i].with;
+        if (!rl_step_runs(pass, &pass->steps.rows[i], job->params) ||
+            !cl_has_port(job, &(rl_port){.role = RL_SCRATCH, .with = with}))
             continue;
         for (int again = 0; again < (job->repeat > 1 ? job->repeat : 1); again++) {
             double ms = run_step(s, job, program, &pass->steps.rows[i], args);
@@ -274,6 +305,8 @@ bool cl_run(cl_session *s, const cl_job *job)
     ok = program != NULL;
     for (size_t i = 0; ok && i < pass->ports.n; i++) {
         const rl_port *port = &pass->ports.rows[i];
+        if (!cl_has_port(job, port))
+            continue;
         planes[i] = cl_make_plane(job, port);
         ok = (planes[i] || port->optional) &&
              add_buffer(s, &args, planes[i], cl_floats_of(job->frame, port) * 4);
@@ -296,16 +329,16 @@ bool cl_run(cl_session *s, const cl_job *job)
     ok = ok && add_buffer(s, &args, (void *)(uintptr_t)job->materials, job->materials_bytes);
     ok = ok && (!pass->tables || add_buffer(s, &args, tables.data, tables.n * 4));
     ok = ok && run_steps(s, job, program, &args);
-    for (size_t i = 0; ok && i < pass->ports.n; i++) {
+    for (size_t i = 0, k = 0; ok && i < pass->ports.n; i++) {
         const rl_port *port = &pass->ports.rows[i];
         const cl_image *image = cl_image_of(job, port);
-        if (port->role == RL_READ || !image)
+        const cl_mem mem = cl_has_port(job, port) ? args.mem[k++] : NULL;
+        if (port->role == RL_READ || port->role == RL_HISTORY || !image || !mem)
             continue;
         size_t skip = port->layout == RL_LINEAR ? RL_GUARD * 4 : 0,
                bytes = cl_floats_of(job->frame, port) * 4;
-        ok = !failed("clEnqueueReadBuffer",
-                     clEnqueueReadBuffer(s->queue, args.mem[i], CL_TRUE, 0, bytes - skip,
-                                         (char *)planes[i] + skip, 0, NULL, NULL));
+        ok = !failed("clEnqueueReadBuffer", clEnqueueReadBuffer(s->queue, mem, CL_TRUE, 0, bytes - skip,
+                                                                (char *)planes[i] + skip, 0, NULL, NULL));
         cl_move_image(job->frame, port, planes[i], NULL, image->write);
     }
     for (cl_uint i = 0; i < args.n; i++)

@@ -25,8 +25,9 @@ void cl_frame(frame_t *f, int x, int y, int width, int height, float focal);
 /* One image of a port: planes of columns × rows, tightly packed; uint32_t for RL_ID. */
 typedef struct cl_image {
     const char *port;
-    const void *read; /* for RL_READ; NULL is an absent optional port */
-    float *write;     /* for RL_WRITE, and RL_SCRATCH when somebody wants to look at it */
+    const void *read; /* for RL_READ and RL_HISTORY; NULL is an absent optional port */
+    float *write;     /* for RL_WRITE, RL_REDUCTION (RL_SUM_FLOATS: asked for), and RL_SCRATCH when somebody
+                         wants to look at it */
 } cl_image;
 
 /* A pass's run. Entries of the material table: has_profile, then the pass's profile, material and shading

@@ -47,11 +47,17 @@ static size_t place(const frame_t *f, rl_layout layout, int plane, int x, int y)
 size_t cl_floats_of(const frame_t *f, const rl_port *port)
 {
     int n = planes_of(port->format);
+    if (port->format == RL_SUMS)
+        return RL_SUM_FLOATS + 2 * RL_GUARD;
     return (size_t)(port->layout == RL_LINEAR ? n * f->plane + 2 * RL_GUARD : n * f->plane4);
 }
 
 void cl_move_image(const frame_t *f, const rl_port *port, float *device, const void *from, float *to)
 {
+    if (port->format == RL_SUMS) {
+        memcpy(to, device + RL_GUARD, RL_SUM_FLOATS * 4);
+        return;
+    }
     for (int p = 0; p < planes_of(port->format); p++)
         for (int y = 0; y < f->rows; y++)
             for (int x = 0; x < f->columns; x++) {
@@ -64,13 +70,27 @@ void cl_move_image(const frame_t *f, const rl_port *port, float *device, const v
             }
 }
 
+static bool is_fed(const rl_port *port)
+{
+    return port->role == RL_READ || port->role == RL_HISTORY;
+}
+
 const cl_image *cl_image_of(const cl_job *job, const rl_port *port)
 {
     for (size_t i = 0; i < job->n_images; i++)
-        if (!strcmp(job->images[i].port, port->name) &&
-            (port->role == RL_READ ? !job->images[i].write : !!job->images[i].write))
+        if (!strcmp(job->images[i].port, port->name) && is_fed(port) == !job->images[i].write)
             return &job->images[i];
     return NULL;
+}
+
+/* Whether the port is an argument of the kernels: what is only for sums is one when somebody wants them. */
+bool cl_has_port(const cl_job *job, const rl_port *port)
+{
+    const char *name = port->role == RL_REDUCTION ? port->name : port->with;
+    for (size_t i = 0; name && i < job->n_images; i++)
+        if (!strcmp(job->images[i].port, name) && job->images[i].write)
+            return true;
+    return !name;
 }
 
 /* Whatever a kernel may not rely on is NaN: margins, guards and scratch. */
@@ -87,7 +107,7 @@ float *cl_make_plane(const cl_job *job, const rl_port *port)
         data[i] = NAN;
     if (port->format == RL_ID)
         memset(data, 0, n * 4);
-    if (port->role == RL_READ)
+    if (is_fed(port) && image && image->read)
         cl_move_image(job->frame, port, data, image->read, NULL);
     return data;
 }

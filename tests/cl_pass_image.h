@@ -14,6 +14,9 @@ void cl_move_image(const frame_t *f, const rl_port *port, float *device, const v
 /* The job's image of a port, NULL when it has none. */
 const cl_image *cl_image_of(const cl_job *job, const rl_port *port);
 
+/* Whether the port is an argument of the kernels. */
+bool cl_has_port(const cl_job *job, const rl_port *port);
+
 /* A port's buffer, filled; NULL when memory is out or nothing feeds it. rl_free. */
 float *cl_make_plane(const cl_job *job, const rl_port *port);
 

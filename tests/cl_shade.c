@@ -236,7 +236,7 @@ static bool add_arguments(launch *l, const shade_run *run)
     const rl_pass *pass = run->pass;
     light_t none = {0};
     for (size_t i = 0; i < pass->ports.n; i++)
-        if (!add_port(l, &run->frame, run->images[i]))
+        if (!rl_port_on_request(&pass->ports.rows[i]) && !add_port(l, &run->frame, run->images[i]))
             return false;
     if (pass->params.n && !add_buffer(l, params_of(run), pass->params_size))
         return false;

@@ -40,7 +40,7 @@ void gaussian_run_on(sss_scene *s, int separable, const gaussian_material *m, si
     const cl_image images[] = {
         {"diffuse", s->diffuse, NULL}, {"lit", s->lit, NULL},           {"albedo", s->albedo, NULL},
         {"normal", s->normal, NULL},   {"depth", s->depth, NULL},       {"stencil", s->stencil, NULL},
-        {"color", NULL, s->color},     {"filtered", NULL, s->filtered},
+        {"color", NULL, s->color},     {"filtered", NULL, s->filtered}, {"energy", NULL, s->energy},
     };
     cl_job job = {.pass = &rl_pass_sss_gaussian,
                   .frame = &s->twin.frame,
@@ -48,7 +48,7 @@ void gaussian_run_on(sss_scene *s, int separable, const gaussian_material *m, si
                   .materials = m,
                   .materials_bytes = bytes,
                   .images = images,
-                  .n_images = 8,
+                  .n_images = s->energy ? 9 : 8,
                   .width = sss_width};
     assert_true(cl_run(on, &job));
 }

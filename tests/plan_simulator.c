@@ -69,8 +69,11 @@ static token port_token(const machine *m, const rl_graph_node *node, int index, 
 
 static bool check_shape(machine *m, const rl_graph_node *node, size_t p, int buffer)
 {
-    static const int planes[] = {[RL_RGB] = 3, [RL_NORMAL] = 3, [RL_VEC2] = 2, [RL_SCALAR] = 1, [RL_ID] = 1};
+    static const int planes[] = {
+        [RL_RGB] = 3, [RL_NORMAL] = 3, [RL_VEC2] = 2, [RL_SCALAR] = 1, [RL_ID] = 1, [RL_SUMS] = 0};
     const rl_port *port = &node->pass->ports.rows[p];
+    if (buffer < 0 && rl_port_on_request(port))
+        return true;
     const bool absent = port->role != RL_SCRATCH && node->images[p] < 0;
     if (absent || buffer < 0)
         return absent == (buffer < 0) || fail(m, "%s.%s: buffer %d", node->name, port->name, buffer);
@@ -111,7 +114,8 @@ static bool run_kernel(machine *m, const rl_plan_step *step)
             return false;
     }
     for (size_t p = 0; p < n; p++)
-        if (node->pass->ports.rows[p].role == RL_WRITE || node->pass->ports.rows[p].role == RL_SCRATCH)
+        if (step->buffers[p] >= 0 &&
+            (rl_port_makes(&node->pass->ports.rows[p]) || node->pass->ports.rows[p].role == RL_SCRATCH))
             *memory(m, step->buffers[p]) = port_token(m, node, step->node, p, step->buffers[p]);
     /* after: no write landed on another port's memory */
     for (size_t p = 0; p < n; p++)
@@ -149,11 +153,25 @@ static void start_frame(machine *m)
     memset(m->next_step, 0, sizeof m->next_step);
 }
 
+/* How many steps of a node run: those for sums come last, and only when the sums have a buffer. */
+static size_t steps_of(const rl_graph *g, const rl_plan_node *n)
+{
+    const rl_pass *pass = g->nodes[n->node].pass;
+    size_t count = 0;
+    for (size_t s = 0; s < pass->steps.n; s++) {
+        bool runs = !pass->steps.rows[s].with;
+        for (size_t p = 0; p < pass->ports.n; p++)
+            runs |= pass->ports.rows[p].role == RL_REDUCTION && n->buffers[p] >= 0;
+        count += runs;
+    }
+    return count;
+}
+
 static bool end_frame(machine *m)
 {
     const rl_graph *g = m->plan->graph;
     for (size_t i = 0; i < m->plan->n_nodes; i++)
-        if ((size_t)m->next_step[m->plan->nodes[i].node] != g->nodes[m->plan->nodes[i].node].pass->steps.n)
+        if ((size_t)m->next_step[m->plan->nodes[i].node] != steps_of(g, &m->plan->nodes[i]))
             return fail(m, "%s did not finish", g->nodes[m->plan->nodes[i].node].name);
     for (size_t o = 0; o < g->n_outputs; o++)
         for (size_t i = 0; i < g->outputs[o].n_images; i++) {

@@ -54,9 +54,9 @@ sss_scene sss_scene_make(int x, int y, int width, int height, float focal)
 
 void sss_scene_free(sss_scene *s)
 {
-    float *all[] = {s->diffuse, s->lit,   s->albedo,   s->normal,
-                    s->depth,   s->color, s->filtered, (float *)s->stencil};
-    for (size_t i = 0; i < 8; i++)
+    float *all[] = {s->diffuse, s->lit,      s->albedo,           s->normal, s->depth,
+                    s->color,   s->filtered, (float *)s->stencil, s->energy};
+    for (size_t i = 0; i < 9; i++)
         rl_free(all[i]);
 }
 
@@ -120,7 +120,7 @@ void sss_run(sss_scene *s, const rl_pass *pass, const void *params, cl_session *
     const cl_image images[] = {
         {"diffuse", s->diffuse, NULL}, {"lit", s->lit, NULL},           {"albedo", s->albedo, NULL},
         {"normal", s->normal, NULL},   {"depth", s->depth, NULL},       {"stencil", s->stencil, NULL},
-        {"color", NULL, s->color},     {"filtered", NULL, s->filtered},
+        {"color", NULL, s->color},     {"filtered", NULL, s->filtered}, {"energy", NULL, s->energy},
     };
     cl_job job = {.pass = pass,
                   .frame = &s->twin.frame,
@@ -128,7 +128,7 @@ void sss_run(sss_scene *s, const rl_pass *pass, const void *params, cl_session *
                   .materials = sss_materials,
                   .materials_bytes = sizeof sss_materials,
                   .images = images,
-                  .n_images = 8,
+                  .n_images = s->energy ? 9 : 8,
                   .width = sss_width};
     assert_true(cl_run(on, &job));
 }

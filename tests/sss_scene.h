@@ -31,7 +31,8 @@ typedef struct sss_scene {
     twin_scene twin;
     float *diffuse, *lit, *albedo, *normal, *depth, *color, *filtered;
     uint32_t *stencil;
-    size_t n; /* pixels of a plane */
+    float *energy; /* RL_SUM_FLOATS; NULL: the ledger is not asked for. rl_free */
+    size_t n;      /* pixels of a plane */
 } sss_scene;
 
 /* Planes of zeros; rl_free. */

@@ -230,7 +230,8 @@ static void test_sharing(void **state)
     size_t n;
     const char *const *materials = rl_experiment_materials(x, 0, &n);
     assert_true(n == 3 && !strcmp(materials[1], "skin"));
-    assert_string_equal(rl_experiment_image_name(x, 0, RL_COMPARED_DISPLAY), "aa.color, sRGB / ACES");
+    assert_string_equal(rl_experiment_image_name(x, 0, RL_COMPARED_DISPLAY), "sRGB / ACES");
+    assert_string_equal(rl_experiment_image_name(x, 0, RL_COMPARED_LINEAR), "aa.color");
     rl_experiment_close(&x);
 }
 

@@ -355,6 +355,42 @@ static void survives_failing_memory(void **state)
 }
 
 #define TEST(f) cmocka_unit_test_teardown(f, teardown)
+/* Sums, and what is there for them alone, exist when an output asks. */
+static void makes_sums_on_request(void **state)
+{
+    static const rl_port ports[] = {{PORT("from", RL_READ, RL_RGB)},
+                                    {PORT("own", RL_SCRATCH, RL_RGB)},
+                                    {PORT("lost", RL_SCRATCH, RL_RGB), .with = "sums"},
+                                    {PORT("sums", RL_REDUCTION, RL_SUMS)},
+                                    {PORT("to", RL_WRITE, RL_RGB)}};
+    static const rl_step steps[] = {{"run", .domain = RL_EVERY_VECTOR},
+                                    {"add_up", .domain = RL_EVERY_BAND, .with = "sums"}};
+    static const rl_pass adder = {.name = "adder", .ports = RL_ARRAY(ports), .steps = RL_ARRAY(steps)};
+    const rl_node nodes[] = {NODE("a", &adder, "capture.albedo"), NODE("b", &adder, "a.to")};
+    const char *const images[] = {"b.to", "a.sums"};
+    rl_geometry g;
+    rl_error err = {0};
+    (void)state;
+    assert_int_equal(rl_geometry_make(0, 0, 100, 50, &g, &err), RL_OK);
+    const rl_plan *plan = plan_for(nodes, 2, images, 1);
+    assert_int_equal(plan->n_steps, 2);
+    for (size_t n = 0; n < 2; n++)
+        assert_true(plan->nodes[n].buffers[1] >= 0 && plan->nodes[n].buffers[2] < 0 &&
+                    plan->nodes[n].buffers[3] < 0);
+    plan = plan_for(nodes, 2, images, 2);
+    assert_int_equal(plan->n_steps, 3); /* of a alone */
+    assert_string_equal(plan->graph->nodes[plan->steps[1].node].name, "a");
+    assert_true(plan->nodes[0].buffers[2] >= 0 && plan->nodes[1].buffers[2] < 0 &&
+                plan->nodes[1].buffers[3] < 0);
+    const rl_buffer *sums = &plan->buffers[plan->nodes[0].buffers[3]];
+    assert_int_equal(plan->outputs[1][0], plan->nodes[0].buffers[3]);
+    assert_true(sums->kind == RL_BUFFER_SINK && sums->planes == 0);
+    assert_int_equal(rl_buffer_bytes(sums, &g), (RL_SUM_FLOATS + 2 * RL_GUARD) * sizeof(float));
+    plan = plan_for(nodes, 2, images + 1, 1); /* the node runs for its sums alone */
+    assert_int_equal(plan->n_steps, 2);
+    assert_int_equal(plan->n_culled, 1);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -365,6 +401,7 @@ int main(void)
         TEST(shares_slots),
         TEST(measures_windows),
         TEST(refuses_what_int_cannot_index),
+        TEST(makes_sums_on_request),
         TEST(survives_failing_memory),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -179,6 +179,14 @@ static const rl_port *past_of(const rl_pass *p, const char *name)
     return NULL;
 }
 
+static bool has_reduction(const rl_pass *p, const char *name)
+{
+    for (size_t i = 0; i < p->ports.n; i++)
+        if (p->ports.rows[i].role == RL_REDUCTION && !strcmp(p->ports.rows[i].name, name))
+            return true;
+    return false;
+}
+
 static void check_port(const rl_pass *p, size_t which)
 {
     const rl_port *a = &p->ports.rows[which];
@@ -193,6 +201,14 @@ static void check_port(const rl_pass *p, size_t which)
     }
     if (a->optional)
         assert_true(a->role == RL_READ || a->role == RL_HISTORY);
+    if (a->role == RL_REDUCTION)
+        assert_true(a->format == RL_SUMS && !a->with);
+    if (a->format == RL_SUMS)
+        assert_true(a->role == RL_REDUCTION);
+    if (a->with) {
+        assert_true(a->role == RL_SCRATCH);
+        assert_true(has_reduction(p, a->with));
+    }
     if (a->any_layout)
         assert_true(a->role == RL_WRITE && a->layout == RL_LINEAR);
     if (a->format == RL_LIGHTS)
@@ -212,6 +228,8 @@ static void test_ports(void **state)
         bool phases = false, writes = false;
         for (size_t k = 0; k < p->steps.n; k++)
             phases |= p->steps.rows[k].domain == RL_EVERY_PHASE;
+        for (size_t k = 0; k < p->steps.n; k++)
+            assert_true(!p->steps.rows[k].with || has_reduction(p, p->steps.rows[k].with));
         for (size_t k = 0; k < p->ports.n; k++) {
             check_port(p, k);
             writes |= p->ports.rows[k].role == RL_WRITE;

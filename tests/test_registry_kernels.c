@@ -123,11 +123,31 @@ static void try_structural(form *f)
     }
 }
 
-/* Optional ports: each absent by itself, each present by itself; free layouts: each in the other one. */
+static bool may_lack(const rl_port *port)
+{
+    return port->optional || rl_port_on_request(port);
+}
+
+/* Whether the form has what a step or a port is only there for. */
+static bool has_reduction(const form *f, const char *with)
+{
+    for (size_t k = 0; with && k < f->pass->ports.n; k++)
+        if (!strcmp(f->pass->ports.rows[k].name, with))
+            return f->buffers[k] >= 0;
+    return !with;
+}
+
+/* Without sums, then: optional ports: each absent by itself, each present by itself; free layouts: each in
+ * the other one. */
 static void try_ports(form *f)
 {
     const rl_port *rows = f->pass->ports.rows;
     size_t n = f->pass->ports.n;
+    for (size_t k = 0; k < n; k++)
+        f->buffers[k] = rl_port_on_request(&rows[k]) ? -1 : (int)k;
+    form_try(f, "no sums");
+    for (size_t k = 0; k < n; k++)
+        f->buffers[k] = (int)k;
     for (size_t i = 0; i < n; i++) {
         if (rows[i].optional) {
             f->buffers[i] = -1;
@@ -172,11 +192,12 @@ static void put(rl_memory *m, const void *data, size_t bytes)
     assert_int_equal(rl_memory_unmap(m, &err), RL_OK);
 }
 
-static rl_memory *image_memory(void)
+static rl_memory *image_memory(rl_format format)
 {
     rl_error err = {0};
     rl_memory *m;
-    size_t floats = 2 * RL_GUARD + 3 * 16 * (SIZE / 4) * (SIZE / 4 + 2 * RL_MARGIN4);
+    size_t floats = format == RL_SUMS ? 2 * RL_GUARD + RL_SUM_FLOATS
+                                      : 2 * RL_GUARD + 3 * 16 * (SIZE / 4) * (SIZE / 4 + 2 * RL_MARGIN4);
     assert_int_equal(rl_memory_new(device, floats * sizeof(float), RL_GUARD * sizeof(float), &m, &err),
                      RL_OK);
     return m;
@@ -196,7 +217,8 @@ static size_t make_arguments(const form *f, rl_memory **args)
     frame.camera.focal[0] = frame.camera.focal[1] = 1;
     frame.previous = frame.camera;
     for (size_t i = 0; i < p->ports.n; i++)
-        args[n++] = f->buffers[i] < 0 ? NULL : image_memory();
+        if (f->buffers[i] >= 0 || !rl_port_on_request(&p->ports.rows[i]))
+            args[n++] = f->buffers[i] < 0 ? NULL : image_memory(p->ports.rows[i].format);
     size_t extra =
         (p->params.n > 0) + 2u + p->lights + p->ambient + 2u * p->light_tables + (p->tables != NULL);
     for (size_t i = 0; i < extra; i++)
@@ -214,7 +236,8 @@ static void run_form(const form *f, const char *what)
     size_t n = make_arguments(f, args);
     rl_error err = {0};
     for (size_t s = 0; s < f->pass->steps.n; s++) {
-        if (!rl_step_runs(f->pass, &f->pass->steps.rows[s], f->params))
+        if (!rl_step_runs(f->pass, &f->pass->steps.rows[s], f->params) ||
+            !has_reduction(f, f->pass->steps.rows[s].with))
             continue;
         rl_dispatch d = {
             .entry = f->pass->steps.rows[s].entry, .arguments = args, .n_arguments = n, .dims = 3};
@@ -241,8 +264,8 @@ static void test_kernel_arguments(void **state)
         run_form(&f, "all ports");
         bool any = false;
         for (size_t k = 0; k < f.pass->ports.n; k++) {
-            any |= f.pass->ports.rows[k].optional;
-            f.buffers[k] = f.pass->ports.rows[k].optional ? -1 : (int)k;
+            any |= may_lack(&f.pass->ports.rows[k]);
+            f.buffers[k] = may_lack(&f.pass->ports.rows[k]) ? -1 : (int)k;
         }
         if (any)
             run_form(&f, "no optional port");

@@ -67,7 +67,7 @@ static int lines(const char *text)
 /* ---- help ------------------------------------------------------------------------------------------------
  */
 
-static const char *const commands[] = {"run",     "check",  "plan",    "init",
+static const char *const commands[] = {"run",     "ab",     "check",   "plan", "init",
                                        "inspect", "passes", "devices", "bench"};
 
 static void expect_narrow(const char *text)
@@ -96,7 +96,7 @@ static void test_help(void **state)
         expect_narrow(one.out);
         assert_non_null(strstr(one.out, "--help"));
         assert_true(!strstr(one.out, "--frames") ==
-                    (i > 2 && i < 7)); /* only run, check, plan and bench take frames */
+                    (i > 3 && i < 8)); /* only run, ab, check, plan and bench take frames */
         tool_result_free(&one);
     }
     tool_result_free(&r);
@@ -144,13 +144,18 @@ static void test_usage(void **state)
         {{"run", "p", "--set", "graph.sss.taps"}, "PATH=VALUE"},
         {{"run", "p", "--set", "=3"}, "PATH=VALUE"},
         {{"plan", "p", "--format", "png"}, "text|dot|svg|json"},
-        {{"init", "c", "--frames", "1"}, "it is for run, check, plan, bench"},
+        {{"init", "c", "--frames", "1"}, "it is for run, ab, check, plan, bench"},
         {{"run", "p", "--quiet", "--verbose"}, "exclude each other"},
         {{"passes", "lightning"}, "did you mean 'lighting'?"},
         {{"run", "p", "--shard", "0/3"}, "I from 1 to N"},
         {{"run", "p", "--shard", "4/3"}, "I from 1 to N"},
         {{"run", "p", "--shard", "3"}, "I from 1 to N"},
         {{"run", "p", "--preroll", "4"}, "give --shard I/N too"},
+        {{"ab"}, "needs a PIPELINE, see"},
+        {{"ab", "p", "--sheet="}, "option '--sheet' takes [=FILE], found ''"},
+        {{"ab", "p", "--shard", "1/2"}, "it is for run, check, plan"},
+        {{"ab", "p", "--seeds", "0"}, "an integer from 1 to 64, found '0'"},
+        {{"run", "p", "--pairs"}, "it is for ab"},
         {{"bench", "--size", "1920"}, "WxH in pixels"},
         {{"bench", "--size", "0x10"}, "WxH in pixels"},
         {{"inspect", "p", "--resume"}, "it is for run, check, plan"},

@@ -7,8 +7,8 @@
 const char *rl_format_name(rl_format format)
 {
     static const char *const names[] = {
-        [RL_RGB] = "rgb",       [RL_NORMAL] = "normal", [RL_VEC2] = "vec2",
-        [RL_SCALAR] = "scalar", [RL_ID] = "id",         [RL_LIGHTS] = "lights",
+        [RL_RGB] = "rgb", [RL_NORMAL] = "normal", [RL_VEC2] = "vec2", [RL_SCALAR] = "scalar",
+        [RL_ID] = "id",   [RL_LIGHTS] = "lights", [RL_SUMS] = "sums",
     };
     return (unsigned)format < RL_ARRAY_LENGTH(names) ? names[format] : "unknown";
 }
@@ -16,7 +16,8 @@ const char *rl_format_name(rl_format format)
 int rl_format_planes(rl_format format)
 {
     static const int planes[] = {
-        [RL_RGB] = 3, [RL_NORMAL] = 3, [RL_VEC2] = 2, [RL_SCALAR] = 1, [RL_ID] = 1, [RL_LIGHTS] = 0,
+        [RL_RGB] = 3, [RL_NORMAL] = 3, [RL_VEC2] = 2, [RL_SCALAR] = 1,
+        [RL_ID] = 1,  [RL_LIGHTS] = 0, [RL_SUMS] = 0,
     };
     return (unsigned)format < RL_ARRAY_LENGTH(planes) ? planes[format] : 0;
 }
@@ -170,7 +171,7 @@ static rl_code add_node(rl_graph_builder *b, const rl_node *node)
     for (size_t p = 0; p < n_ports && code == RL_OK; p++) {
         const rl_port *port = &node->pass->ports.rows[p];
         bound[p] = -1;
-        if (port->role != RL_WRITE)
+        if (!rl_port_makes(port))
             continue;
         bound[p] = (int)b->n_images;
         code = add_image(b, node->name, port->name,

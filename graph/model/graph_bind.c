@@ -34,7 +34,7 @@ static rl_code names_of_images(rl_graph_builder *b, int node, names *out)
         return rl_fail_memory(b->err, b->n_images * sizeof *out->list);
     size_t skip = strlen(node < 0 ? CAPTURE : b->nodes[node].name) + 1;
     for (size_t i = 0; i < b->n_images; i++)
-        if (b->images[i].node == node)
+        if (b->images[i].node == node && b->images[i].format != RL_SUMS)
             out->list[out->n++] = b->images[i].name + skip;
     return RL_OK;
 }

@@ -31,7 +31,7 @@ rl_code rl_graph_resolve(rl_graph_builder *b, const char *name, rl_where where, 
 rl_code rl_graph_check_format(rl_graph_builder *b, const char *user, const rl_port *port, int image,
                               rl_where where);
 
-/* Planes of an image that a pass makes; RL_LIGHTS has no number of its own: 0. */
+/* Planes of an image that a pass makes; RL_LIGHTS has no number of its own, and RL_SUMS no planes: 0. */
 int rl_format_planes(rl_format format);
 
 /* Depth-first from the roots (nodes; -1 is skipped): `order` (room for n_nodes) gets every node that they

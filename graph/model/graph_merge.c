@@ -198,7 +198,7 @@ static rl_code add_node(merger *m, size_t variant, int index, rl_content content
     const int first = (int)m->n_images;
     for (size_t p = 0; p < n_ports; p++) {
         bound[p] = -1;
-        if (node->pass->ports.rows[p].role != RL_WRITE || node->images[p] < 0)
+        if (!rl_port_makes(&node->pass->ports.rows[p]) || node->images[p] < 0)
             continue;
         const rl_image *from = &g->images[node->images[p]];
         rl_image image = *from;
@@ -247,7 +247,7 @@ static rl_code merge_node(merger *m, size_t variant, int index, int *images)
     m->used[merged][variant] = true;
     m->from[merged].n_used++;
     for (size_t p = 0; p < node->pass->ports.n; p++)
-        if (node->pass->ports.rows[p].role == RL_WRITE && node->images[p] >= 0)
+        if (rl_port_makes(&node->pass->ports.rows[p]) && node->images[p] >= 0)
             images[node->images[p]] = m->nodes[merged].images[p];
     return RL_OK;
 }

@@ -4,7 +4,8 @@
  * The tables here are the only truth: they drive parsing, range checks, --set, did-you-mean, `relit passes`,
  * the documentation, the OpenCL struct that the kernel sees and the order of the kernel's arguments:
  *
- *     one buffer a port, in the order of the ports (NULL for an optional port that nothing feeds),
+ *     one buffer a port, in the order of the ports (NULL for an optional port that nothing feeds; none for
+ *                              a REDUCTION, and what is .with it, that nobody asks for)
  *     constant params_t *      the parameters, in the order of their rows (absent when there are none)
  *     constant frame_t *       size, number, cameras            (kernels/shared.h)
  *     constant material_t *    one entry a dense stencil index  (generated: every registered pass's rows)
@@ -150,6 +151,9 @@ typedef enum rl_role {
     RL_WRITE,
     RL_HISTORY, /* what the port named by .of held one frame before; never aliased, makes no ordering edge */
     RL_SCRATCH, /* between the steps of this pass; nobody else sees it */
+    RL_REDUCTION, /* sums over the frame that the host reads, of format RL_SUMS; nobody binds them. What only
+                     they need (.with, here and in steps) exists when an output asks for them: then WANTS_NAME
+                     is 1, else 0, and the kernels have no such arguments */
 } rl_role;
 
 typedef enum rl_format {
@@ -160,6 +164,7 @@ typedef enum rl_format {
     RL_ID,     /* 1 plane of uint: dense stencil index, 0 = no material */
     RL_LIGHTS, /* a plane for each light that has the layer, in the order of the lights (light_t says which)
                 */
+    RL_SUMS,   /* no planes: RL_SUM_FLOATS floats a frame, whatever its size (kernels/shared.h) */
 } rl_format;
 
 typedef enum rl_layout {
@@ -180,8 +185,21 @@ typedef struct rl_port {
                        with a profile and that word makes the port required (graph.h); NULL = none does */
     const char *of; /* HISTORY: the port (own output first, else own input) whose past this is */
     rl_layout layout; /* the layout that the kernel wants; the plan inserts the conversion */
+    const char *with; /* SCRATCH: the REDUCTION port that it exists for; NULL = always */
     bool any_layout;  /* WRITE: the kernel stores through RL_STORE, so the plan may choose (LAYOUT_NAME) */
 } rl_port;
+
+/* Whether a port makes an image of the graph. */
+static inline bool rl_port_makes(const rl_port *port)
+{
+    return port->role == RL_WRITE || port->role == RL_REDUCTION;
+}
+
+/* Ports that nobody asked for, as others have none, are no arguments of the kernels. */
+static inline bool rl_port_on_request(const rl_port *port)
+{
+    return port->role == RL_REDUCTION || port->with;
+}
 
 /* ---- steps --------------------------------------------------------------------------------------------- */
 
@@ -190,6 +208,7 @@ typedef enum rl_domain {
     RL_EVERY_VECTOR, /* an item RL_W pixels of a row: x = RL_W*get_global_id(0), y = (1) */
     RL_EVERY_PHASE,  /* an item RL_W pixels of one sub-image of RL_PHASE4: (0) = phase, (1) = vector, (2) =
                         sub-row */
+    RL_EVERY_BAND,   /* an item every RL_BANDS-th part of the rows: (0) = band (kernels/energy.cl) */
 } rl_domain;
 
 typedef struct rl_step {
@@ -197,6 +216,7 @@ typedef struct rl_step {
     rl_domain domain;
     const char *when; /* a structural parameter: the step runs only where it is .is; NULL = always */
     int32_t is;
+    const char *with; /* a REDUCTION port: the step runs only when an output asks for it; NULL = always */
 } rl_step;
 
 /* ---- the pass ------------------------------------------------------------------------------------------ */
@@ -245,9 +265,13 @@ typedef struct rl_pass {
      * holds elsewhere. */
     double (*least_share)(const void *params);
     const char *fades_where;
+    /* Passes with a parameter `seed`: whether the result depends on it; `march`: some light has `shadow:
+     * screen`. NULL: it always does. */
+    bool (*stochastic)(const void *params, bool march);
     /* What the arithmetic of a pixel costs, as so many reads or writes of a plane: a rough figure from `relit
      * bench`, for predictions. NULL: next to nothing. `params` is the pass's struct. */
     double (*cost)(const void *params);
+    bool conserves; /* what its ledger (graph/run/energy.h) says to come out should be what goes in */
 } rl_pass;
 
 /* The struct holds the table's 4-byte fields and nothing else; RGB rows count three. */

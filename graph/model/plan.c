@@ -2,6 +2,7 @@
 
 #include <limits.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "graph/model/graph_build.h"
 #include "graph/model/params.h"
@@ -49,7 +50,7 @@ static void want_ports(rl_planner *p, int place)
         if (node->images[i] < 0)
             continue;
         rl_image_plan *image = &p->images[node->images[i]];
-        image->live = true;
+        image->live = image->live || port->role != RL_REDUCTION;
         if (port->role == RL_HISTORY)
             image->past[port->layout] = true;
         if (port->role == RL_READ) {
@@ -82,13 +83,13 @@ static rl_code want_images(rl_planner *p)
     for (size_t i = 0; i < g->n_images; i++)
         p->images[i] =
             (rl_image_plan){.reader = {INT_MAX, INT_MAX}, .now = {-1, -1}, .before = {-1, -1}, .sink = -1};
-    for (size_t i = 0; i < p->n_live; i++)
-        want_ports(p, (int)i);
     for (size_t o = 0; o < g->n_outputs; o++)
         for (size_t i = 0; i < g->outputs[o].n_images; i++) {
             rl_image_plan *image = &p->images[g->outputs[o].images[i]];
             image->live = image->output = true;
         }
+    for (size_t i = 0; i < p->n_live; i++)
+        want_ports(p, (int)i);
     for (size_t i = 0; i < g->n_images; i++)
         p->images[i].made = choose_layout(g, &g->images[i], &p->images[i]);
     return RL_OK;
@@ -133,6 +134,15 @@ static void buffer_image(rl_planner *p, int index)
                          : plan->now[RL_LINEAR];
 }
 
+/* Whether an output asks for the REDUCTION port that something exists for. */
+static bool wants(const rl_planner *p, const rl_graph_node *node, const char *with)
+{
+    for (size_t i = 0; with && i < node->pass->ports.n; i++)
+        if (node->pass->ports.rows[i].role == RL_REDUCTION && !strcmp(node->pass->ports.rows[i].name, with))
+            return p->images[node->images[i]].output;
+    return !with;
+}
+
 /* The buffers of a live node's ports; its scratch comes into being here. */
 static rl_code buffer_node(rl_planner *p, size_t place)
 {
@@ -148,15 +158,17 @@ static rl_code buffer_node(rl_planner *p, size_t place)
         const rl_image_plan *image = node->images[i] >= 0 ? &p->images[node->images[i]] : NULL;
         bound[i] = -1;
         if (port->role == RL_SCRATCH) {
+            if (!wants(p, node, port->with))
+                continue;
             const char *name = rl_arena_printf(p->arena, "%s.%s", node->name, port->name);
             if (!name)
                 return rl_fail_memory(p->err, 64);
             bound[i] =
                 add_buffer(p, -1, name, port->layout, rl_format_planes(port->format), RL_BUFFER_TRANSIENT);
         } else if (image) {
-            bound[i] = port->role == RL_WRITE     ? image->now[image->made]
+            bound[i] = port->role == RL_READ      ? image->now[port->layout]
                        : port->role == RL_HISTORY ? image->before[port->layout]
-                                                  : image->now[port->layout];
+                                                  : image->now[image->made];
         }
     }
     return RL_OK;
@@ -271,9 +283,11 @@ static rl_code make_steps(rl_planner *p)
             code = add_conversion(p, list[next].image);
         if (i == p->n_live)
             break;
-        const rl_pass *pass = p->graph->nodes[p->order[i]].pass;
+        const rl_graph_node *node = &p->graph->nodes[p->order[i]];
+        const rl_pass *pass = node->pass;
         for (size_t s = 0; s < pass->steps.n; s++) {
-            if (!rl_step_runs(pass, &pass->steps.rows[s], p->graph->nodes[p->order[i]].params))
+            if (!rl_step_runs(pass, &pass->steps.rows[s], node->params) ||
+                !wants(p, node, pass->steps.rows[s].with))
                 continue;
             p->steps[p->n_steps++] =
                 (rl_plan_step){RL_STEP_KERNEL, p->order[i], (int)s, p->nodes[i].buffers, (int)pass->ports.n};

@@ -33,7 +33,7 @@ typedef struct rl_buffer {
     int image;        /* of the graph, or -1: scratch of a node */
     const char *name; /* the image's, or "sss.filtered" for a scratch port */
     rl_layout layout;
-    int planes;
+    int planes; /* 0: RL_SUMS */
     rl_buffer_class kind;
     int slot;        /* TRANSIENT: the slot that it lives in; else -1 */
     int first, last; /* steps, inclusive, during which it holds something; SOURCE: first = -1; SINK, and a

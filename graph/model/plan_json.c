@@ -92,10 +92,8 @@ static json_t *buffers_json(writer *w)
 static json_t *ports_json(writer *w, const rl_graph_node *node, const int *buffers)
 {
     static const char *const roles[] = {
-        [RL_READ] = "read",
-        [RL_WRITE] = "write",
-        [RL_HISTORY] = "history",
-        [RL_SCRATCH] = "scratch",
+        [RL_READ] = "read",       [RL_WRITE] = "write",         [RL_HISTORY] = "history",
+        [RL_SCRATCH] = "scratch", [RL_REDUCTION] = "reduction",
     };
     json_t *array = json_array();
     for (size_t p = 0; p < node->pass->ports.n; p++) {

@@ -127,9 +127,11 @@ static size_t multiply(size_t a, size_t b)
     return b && a > SIZE_MAX / b ? SIZE_MAX : a * b;
 }
 
-/* Samples of a buffer without its guards. */
+/* Samples of a buffer without its guards; sums have no planes. */
 static size_t samples(const rl_buffer *b, const rl_geometry *g)
 {
+    if (!b->planes)
+        return RL_SUM_FLOATS;
     return multiply((size_t)b->planes, (size_t)(b->layout == RL_PHASE4 ? g->plane4 : g->plane));
 }
 

@@ -30,7 +30,7 @@ const char *rl_buffer_class_name(rl_buffer_class kind)
 
 static void print_bindings(const rl_plan *plan, const rl_plan_step *step, rl_str *out)
 {
-    static const rl_role roles[] = {RL_READ, RL_HISTORY, RL_WRITE};
+    static const rl_role roles[] = {RL_READ, RL_HISTORY, RL_WRITE, RL_REDUCTION};
     const rl_graph_node *node = &plan->graph->nodes[step->node];
     const char *between = " ";
     for (size_t r = 0; r < RL_ARRAY_LENGTH(roles); r++) {

@@ -51,7 +51,7 @@ static bool is_vector_type(const char *name)
 static bool is_reserved(const char *name)
 {
     /* The generated part and common.cl define macros that begin so; "__" belongs to the compiler. */
-    static const char *const beginnings[] = {"RL_", "rl_", "P_", "HAS_", "LAYOUT_", "__"};
+    static const char *const beginnings[] = {"RL_", "rl_", "P_", "HAS_", "WANTS_", "LAYOUT_", "__"};
     for (size_t i = 0; i < RL_ARRAY_LENGTH(reserved); i++)
         if (!strcmp(name, reserved[i]))
             return true;

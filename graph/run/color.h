@@ -66,6 +66,11 @@ typedef struct rl_primaries {
 rl_code rl_color_primaries(const rl_ocio *ocio, const char *space, rl_where where, rl_primaries *out,
                            rl_error *err);
 
+/* The matrix (rows listed, column vectors) from linear RGB with these primaries and white to linear Rec. 709;
+ * another white than D65 is adapted after Bradford. False when the primaries lie on a line or the white has
+ * no luminance: there is no such matrix. Pure. */
+bool rl_color_to_rec709(const double xy[8], double m[9]);
+
 #ifdef __cplusplus
 }
 #endif

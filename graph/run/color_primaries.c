@@ -162,3 +162,26 @@ rl_code rl_color_primaries(const rl_ocio *ocio, const char *space, rl_where wher
     }
     return RL_OK;
 }
+
+static double area(const double xy[8])
+{
+    return (xy[2] - xy[0]) * (xy[5] - xy[1]) - (xy[4] - xy[0]) * (xy[3] - xy[1]);
+}
+
+bool rl_color_to_rec709(const double xy[8], double m[9])
+{
+    static const double rec709[8] = {0.64, 0.33, 0.30, 0.60, 0.15, 0.06, WHITE_D65};
+    double from[9], to[9], adapted[9], inverse[9], both[9];
+    for (int i = 0; i < 8; i++)
+        if (!isfinite(xy[i]))
+            return false;
+    if (fabs(area(xy)) < 1e-6 || !(xy[7] > 0))
+        return false;
+    to_xyz(xy, from);
+    to_xyz(rec709, to);
+    adapt(xy + 6, rec709 + 6, adapted);
+    invert(to, inverse);
+    multiply(adapted, from, both);
+    multiply(inverse, both, m);
+    return true;
+}

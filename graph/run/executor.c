@@ -241,6 +241,9 @@ static void domain_sizes(rl_domain domain, const rl_geometry *g, rl_dispatch *d)
     case RL_EVERY_PHASE:
         *d = (rl_dispatch){.dims = 3, .global = {16, columns / 64, rows / 4}, .local = {16, 1, 1}};
         break;
+    case RL_EVERY_BAND:
+        *d = (rl_dispatch){.dims = 1, .global = {RL_BANDS}, .local = {1}};
+        break;
     }
 }
 
@@ -260,7 +263,8 @@ static rl_code run_kernel(rl_executor *x, const rl_plan_step *s, const rl_frame_
         return rl_fail(err, RL_E_CONFIG, g->where, "pass '%s' (%s) has too many ports (%zu)", g->name,
                        pass->name, pass->ports.n);
     for (size_t i = 0; i < pass->ports.n; i++)
-        args[k++] = locate(x, f, s->buffers[i], pass->ports.rows[i].role == RL_HISTORY);
+        if (s->buffers[i] >= 0 || !rl_port_on_request(&pass->ports.rows[i]))
+            args[k++] = locate(x, f, s->buffers[i], pass->ports.rows[i].role == RL_HISTORY);
     if (pass->params.n > 0)
         args[k++] = n->params;
     args[k++] = scene->frame;

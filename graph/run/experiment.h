@@ -12,6 +12,7 @@
 
 #include "graph/model/plan.h"
 #include "graph/relit.h"
+#include "graph/run/energy.h"
 #include "graph/run/sink.h"
 
 #ifdef __cplusplus
@@ -102,6 +103,10 @@ typedef struct rl_experiment_frame {
     const rl_compared_image (*images)[RL_COMPARED]; /* [variants] */
     const char *const *const *files;                /* [variants][n_files[v]]: what was written */
     const size_t *n_files;
+    const rl_energy_row *energy; /* [n_energy] with options.energy, else none: of each variant the live nodes
+                                    that keep a ledger, in order of execution. Materials are those of
+                                    rl_experiment_materials */
+    size_t n_energy;
     size_t done, total;
 } rl_experiment_frame;
 

@@ -28,6 +28,15 @@ static double node_weight(const rl_group *g, int node)
     return sum;
 }
 
+/* A variant may have made a node twice: its preview, and the image that is compared. */
+static size_t count_used(const bool *used, size_t n)
+{
+    size_t count = 0;
+    for (size_t v = 0; v < n; v++)
+        count += used[v];
+    return count;
+}
+
 bool rl_experiment_node(const rl_experiment *x, size_t capture, size_t i, rl_merged_node *out)
 {
     if (capture >= x->n_captures)
@@ -46,7 +55,7 @@ bool rl_experiment_node(const rl_experiment *x, size_t capture, size_t i, rl_mer
                                 .name = n->name,
                                 .pass = n->pass,
                                 .used = g->used[node],
-                                .n_used = g->merged->nodes[node].n_used,
+                                .n_used = count_used(g->used[node], x->n),
                                 .hash = g->merged->nodes[node].content.low,
                                 .ms = g->frames ? 1e-6 * g->node_ns[node] / (double)g->frames : -1,
                                 .weight = node_weight(g, node)};

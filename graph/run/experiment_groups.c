@@ -113,11 +113,14 @@ static rl_code merge_group(rl_experiment *x, size_t capture, rl_group *g, rl_err
         keep_ids |= rl_session_keeps_ids(s);
     }
     rl_code code = rl_graph_merge(&x->arena, inputs, g->n, &g->merged, err);
+    const rl_graph *graph = NULL;
     if (!code)
-        code = rl_plan_make(&x->arena, g->merged->graph, &g->plan, err);
+        code = rl_experiment_want_energy(x, g, &graph, err);
+    if (!code)
+        code = rl_plan_make(&x->arena, graph, &g->plan, err);
     for (size_t i = 0; i < g->n && !code; i++) {
         rl_sequence *q = rl_experiment_sequence(x, g->members[i], capture);
-        q->graph = g->merged->graph;
+        q->graph = graph;
         q->plan = g->plan;
         q->first_output = g->merged->first_output[i];
     }

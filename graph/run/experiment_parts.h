@@ -55,6 +55,14 @@ static inline rl_sequence *rl_experiment_sequence(const rl_experiment *x, size_t
     return &x->sessions[variant]->sequences[capture];
 }
 
+/* experiment_energy.c: an output behind all others of the group's merged graph, the sums of all nodes that
+ * keep a ledger. *out is the graph itself when that is not wanted. */
+rl_code rl_experiment_want_energy(rl_experiment *experiment, const rl_group *group, const rl_graph **out,
+                                  rl_error *err);
+/* What they hold of a frame that ran, a row for each variant that needs the node. */
+rl_code rl_experiment_read_energy(const rl_experiment *experiment, size_t capture, size_t group,
+                                  const rl_frame *frame, rl_energy_ledger *out, rl_error *err);
+
 /* experiment_groups.c: groups, merged graphs and plans of a capture, in the sessions' sequences too. */
 rl_code rl_experiment_merge(rl_experiment *experiment, size_t capture, rl_error *err);
 

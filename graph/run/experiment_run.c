@@ -138,6 +138,7 @@ typedef struct delivery {
     size_t *n_files;
     rl_memory **mapped;
     size_t n_mapped;
+    rl_energy_ledger energy;
     rl_arena arena;
 } delivery;
 
@@ -221,6 +222,10 @@ static rl_code deliver(run_state *r, slot *s, delivery *d, rl_error *err)
         if (!code)
             code = map_variant(r, d, f, v, err);
     }
+    for (size_t g = 0; g < r->c->n_groups && !code; g++)
+        code = rl_experiment_read_energy(r->x, r->capture, g, &s->frames[g], &d->energy, err);
+    d->frame.energy = d->energy.rows;
+    d->frame.n_energy = d->energy.n;
     rl_sink_image stencil = {0};
     if (!code)
         code =
@@ -276,6 +281,7 @@ static void batch_write(void *ctx, size_t item, int index)
     count(r, s);
     for (size_t g = 0; g < r->c->n_groups; g++)
         rl_frame_release(&s->frames[g]);
+    rl_energy_ledger_free(&d.energy);
     rl_arena_free(&d.arena);
 }
 

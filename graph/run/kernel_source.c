@@ -82,6 +82,8 @@ static void add_ports(const rl_plan *plan, const rl_plan_node *node, const rl_pa
         int b = node->buffers[i];
         if (port->role == RL_READ)
             rl_str_printf(out, "#define HAS_%s %d\n", port->name, b >= 0);
+        if (port->role == RL_REDUCTION)
+            rl_str_printf(out, "#define WANTS_%s %d\n", port->name, b >= 0);
         if (port->role == RL_WRITE && port->any_layout)
             rl_str_printf(out, "#define LAYOUT_%s %d\n", port->name,
                           b >= 0 ? (int)plan->buffers[b].layout : 0);

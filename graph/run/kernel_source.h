@@ -25,7 +25,8 @@ enum {
 };
 
 /* `lights`: RL_LIGHTS_….
- * HAS_x, LAYOUT_x, P_x, params_t, material_t, then the sources, each behind a #line with its name. */
+ * HAS_x, WANTS_x, LAYOUT_x, P_x, params_t, material_t, then the sources, each behind a #line with its name.
+ */
 rl_code rl_kernel_text(rl_arena *arena, const rl_plan *plan, const rl_plan_node *node, unsigned lights,
                        rl_str *out, rl_error *err);
 

@@ -28,9 +28,12 @@ typedef struct rl_active_light {
     int profile;         /* where its profile is in the table of all, 0 = none */
 } rl_active_light;
 
-/* Of a variant: the images that are compared (experiment.h), for people. */
+/* Of a variant: the images that are compared (experiment.h), for people, and the output whose display, view,
+ * look and exposure DISPLAY has ("sRGB / ACES": `space`). */
 typedef struct rl_compared_names {
     const char *linear, *display;
+    const char *space;
+    const rl_output *shown;
 } rl_compared_names;
 
 /* One capture with all that depends on it. Constant after rl_session_open, except for the executor. */

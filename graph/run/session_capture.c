@@ -195,6 +195,12 @@ static rl_code check_formats(const rl_session *s, const rl_graph *graph, rl_erro
     for (size_t i = 0; i < s->n_outputs; i++) {
         const rl_output *o = s->outputs[i].spec;
         const rl_image *image = &graph->images[graph->outputs[i].images[0]];
+        for (size_t k = 0; k < graph->outputs[i].n_images; k++)
+            if (graph->images[graph->outputs[i].images[k]].format == RL_SUMS)
+                return rl_fail(err, RL_E_CONFIG, o->layers[k].where,
+                               "output '%s': '%s' is sums over a frame, no image; 'relit ab' writes them, as "
+                               "the ledger of energy",
+                               o->name, graph->images[graph->outputs[i].images[k]].name);
         bool many = image->planes > 3 || image->planes == 2;
         if (strcasecmp(rl_path_extension(o->file), ".exr") && (image->format == RL_ID || many))
             return rl_fail(err, RL_E_CONFIG, o->file_where,

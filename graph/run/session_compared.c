@@ -60,8 +60,9 @@ rl_code rl_session_compared(rl_session *s, rl_error *err)
         code = add(s, "compare.display", &display, &about, err);
     if (code)
         return code;
-    const char *image = chosen->layers[0].image;
-    s->compared.linear = rl_arena_printf(&s->arena, "%s, linear Rec. 709", image);
-    s->compared.display = rl_arena_printf(&s->arena, "%s, %s", image, about.space);
-    return s->compared.linear && s->compared.display ? RL_OK : rl_fail_memory(err, 1);
+    s->compared.space = about.space;
+    s->compared.shown = chosen->display ? chosen : about.spec;
+    s->compared.linear = chosen->layers[0].image;
+    s->compared.display = about.space;
+    return RL_OK;
 }

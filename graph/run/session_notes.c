@@ -57,8 +57,8 @@ static const char *category(const rl_graph *graph, const rl_plan_step *step)
     return graph->nodes[step->node].where.file ? "kernel" : "colour";
 }
 
-void rl_session_step_spans(const rl_run_hooks *hooks, const rl_sequence *q,
-                           const rl_frame *f, const rl_span *spans)
+void rl_session_step_spans(const rl_run_hooks *hooks, const rl_sequence *q, const rl_frame *f,
+                           const rl_span *spans)
 {
     for (size_t i = 0; spans && hooks && hooks->span && i < q->plan->n_steps; i++) {
         const rl_plan_step *step = &q->plan->steps[i];

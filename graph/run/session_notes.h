@@ -19,8 +19,8 @@ void rl_session_stage(const rl_run_hooks *hooks, rl_lane lane, const rl_frame *f
 void rl_session_span(const rl_run_hooks *hooks, const rl_sequence *sequence, const rl_frame *frame,
                      rl_lane lane, const char *category, const char *name, double start_s);
 /* The plan's steps, after the device has finished. */
-void rl_session_step_spans(const rl_run_hooks *hooks, const rl_sequence *sequence,
-                           const rl_frame *frame, const rl_span *spans);
+void rl_session_step_spans(const rl_run_hooks *hooks, const rl_sequence *sequence, const rl_frame *frame,
+                           const rl_span *spans);
 
 #ifdef __cplusplus
 }

@@ -1,6 +1,9 @@
 #include "graph/run/shim_oiio.h"
 
+#include <OpenImageIO/imagebuf.h>
+#include <OpenImageIO/imagebufalgo.h>
 #include <OpenImageIO/imageio.h>
+#include <fontconfig/fontconfig.h>
 
 #include <cstdio>
 #include <exception>
@@ -186,9 +189,73 @@ static void close_image(rl_oiio_file *file)
     }
 }
 
+/* The file of a font, found once. */
+static std::string find_font(bool bold)
+{
+    std::string path;
+    FcPattern *wanted = FcPatternCreate(), *got = nullptr;
+    FcResult result = FcResultNoMatch;
+    FcChar8 *file = nullptr;
+    if (!wanted)
+        return path;
+    FcPatternAddString(wanted, FC_FAMILY, reinterpret_cast<const FcChar8 *>("DejaVu Sans"));
+    FcPatternAddString(wanted, FC_FAMILY, reinterpret_cast<const FcChar8 *>("sans-serif"));
+    FcPatternAddInteger(wanted, FC_WEIGHT, bold ? FC_WEIGHT_BOLD : FC_WEIGHT_REGULAR);
+    FcPatternAddBool(wanted, FC_SCALABLE, FcTrue);
+    FcConfigSubstitute(nullptr, wanted, FcMatchPattern);
+    FcDefaultSubstitute(wanted);
+    got = FcFontMatch(nullptr, wanted, &result);
+    if (got && FcPatternGetString(got, FC_FILE, 0, &file) == FcResultMatch)
+        path = reinterpret_cast<const char *>(file);
+    if (got)
+        FcPatternDestroy(got);
+    FcPatternDestroy(wanted);
+    return path;
+}
+
+static const std::string &font(int bold)
+{
+    static const std::string regular = find_font(false), heavy = find_font(true);
+    return bold ? heavy : regular;
+}
+
+static const char no_font[] = "text needs a font (Debian: fonts-dejavu-core), and fontconfig finds none";
+
+static int text_width(const char *text, int height, int bold, int *width, char *message, size_t size)
+{
+    try {
+        if (font(bold).empty())
+            return failed(no_font, message, size);
+        OIIO::ROI roi = OIIO::ImageBufAlgo::text_size(text, height, font(bold));
+        *width = roi.defined() && roi.xend > 0 ? roi.xend : 0; /* of nothing, its box is inside out */
+        if (!roi.defined() && OIIO::has_error())
+            return failed(OIIO::geterror(), message, size);
+        return 0;
+    } catch (...) {
+        return caught(message, size);
+    }
+}
+
+static int draw_text(const char *text, int height, int bold, float *plane, int plane_width, int plane_height,
+                     int x, int baseline, char *message, size_t size)
+{
+    try {
+        if (font(bold).empty())
+            return failed(no_font, message, size);
+        const float white = 1;
+        OIIO::ImageBuf image(OIIO::ImageSpec(plane_width, plane_height, 1, OIIO::TypeFloat), plane);
+        if (!OIIO::ImageBufAlgo::render_text(image, x, baseline, text, height, font(bold),
+                                             OIIO::cspan<float>(&white, 1)))
+            return failed(image.geterror(), message, size);
+        return 0;
+    } catch (...) {
+        return caught(message, size);
+    }
+}
+
 extern "C" EXPORT const rl_oiio_module *rl_oiio_module_get(void)
 {
-    static const rl_oiio_module module = {RL_OIIO_VERSION, write_image,    writable,   open_image,
-                                          read_image,      read_attribute, close_image};
+    static const rl_oiio_module module = {RL_OIIO_VERSION, write_image, writable,   open_image, read_image,
+                                          read_attribute,  close_image, text_width, draw_text};
     return &module;
 }

@@ -11,7 +11,7 @@ extern "C" {
 #endif
 
 /* Counts up when anything below changes. */
-#define RL_OIIO_VERSION 1
+#define RL_OIIO_VERSION 2
 
 typedef enum rl_oiio_type { RL_OIIO_U8, RL_OIIO_U16, RL_OIIO_HALF, RL_OIIO_FLOAT } rl_oiio_type;
 
@@ -57,6 +57,13 @@ typedef struct rl_oiio_module {
     /* A text attribute, "" when there is none. Lives until close. */
     const char *(*attribute)(rl_oiio_file *file, const char *name);
     void (*close)(rl_oiio_file *file); /* NULL is safe */
+    /* A line of UTF-8 text in DejaVu Sans, or in what fontconfig has instead; `height` is of a line, pixels.
+     */
+    int (*text_width)(const char *text, int height, int bold, int *width, char *message, size_t size);
+    /* Draws it into a plane of width · height floats without gaps, 0 … 1, black where there is none: its
+     * left end at (x, baseline). What lies outside is cut off. */
+    int (*text)(const char *text, int height, int bold, float *plane, int plane_width, int plane_height,
+                int x, int baseline, char *message, size_t size);
 } rl_oiio_module;
 
 /* The only symbol of the module. */

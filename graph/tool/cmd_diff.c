@@ -7,21 +7,15 @@
 #include "graph/run/image_file.h"
 #include "graph/tool/compare_image.h"
 #include "graph/tool/heatmap.h"
+#include "graph/tool/threshold.h"
 #include "graph/tool/tool.h"
 
 static const char place[] = "relit diff";
 
-/* One --fail-over. */
-typedef struct threshold {
-    int metric; /* rl_metric, or -1: the one that is shown */
-    rl_stat stat;
-    double limit;
-} threshold;
-
 typedef struct comparison {
     rl_compare_image reference, test;
     rl_metric metric;
-    threshold *thresholds;
+    rl_threshold *thresholds;
     rl_pool *pool;
     float *map;
     bool known[RL_METRICS];
@@ -30,80 +24,19 @@ typedef struct comparison {
 
 /* ---- what was asked for -------------------------------------------------------------------------------- */
 
-static rl_code find_metric(const char *option, const char *name, int *out, rl_error *err)
-{
-    const char *known[RL_METRICS];
-    *out = rl_metric_named(name);
-    if (*out >= 0)
-        return RL_OK;
-    for (int i = 0; i < RL_METRICS; i++)
-        known[i] = rl_metric_name((rl_metric)i);
-    rl_str text = {0};
-    rl_suggest(&text, name, known, RL_METRICS, "known");
-    rl_fail_file(err, RL_E_USAGE, place, "option '--%s': there is no metric '%s'%s", option, name,
-                 rl_str_text(&text));
-    rl_str_free(&text);
-    return RL_E_USAGE;
-}
-
-static rl_code find_stat(const char *name, rl_stat *out, rl_error *err)
-{
-    const char *known[RL_STATS];
-    int stat = rl_stat_named(name);
-    if (stat >= 0) {
-        *out = (rl_stat)stat;
-        return RL_OK;
-    }
-    for (int i = 0; i < RL_STATS; i++)
-        known[i] = rl_stat_name((rl_stat)i);
-    rl_str text = {0};
-    rl_suggest(&text, name, known, RL_STATS, "known");
-    rl_fail_file(err, RL_E_USAGE, place, "option '--fail-over': there is no statistic '%s'%s", name,
-                 rl_str_text(&text));
-    rl_str_free(&text);
-    return RL_E_USAGE;
-}
-
-/* "0.02", "flip=0.02", "flip.p95=0.05". */
-static rl_code parse_threshold(rl_arena *arena, const char *text, threshold *out, rl_error *err)
-{
-    const char *equals = strchr(text, '='), *number = equals ? equals + 1 : text;
-    *out = (threshold){-1, RL_STAT_MEAN, 0};
-    if (equals) {
-        char *name = rl_arena_strndup(arena, text, (size_t)(equals - text));
-        if (!name)
-            return rl_fail_memory(err, strlen(text));
-        char *dot = strchr(name, '.');
-        if (dot)
-            *dot = 0;
-        if (find_metric("fail-over", name, &out->metric, err) || (dot && find_stat(dot + 1, &out->stat, err)))
-            return err->code;
-        if (out->metric == RL_METRIC_PSNR && out->stat != RL_STAT_MEAN)
-            return rl_fail_file(err, RL_E_USAGE, place, "option '--fail-over': psnr has a mean, no %s",
-                                rl_stat_name(out->stat));
-    }
-    if (!rl_parse_double(number, &out->limit) || !isfinite(out->limit))
-        return rl_fail_file(
-            err, RL_E_USAGE, place,
-            "option '--fail-over' takes [METRIC.STAT=]X, such as 0.02 or flip.p95=0.05, found "
-            "'%s'",
-            text);
-    return RL_OK;
-}
-
 /* All that can be wrong before a pixel is read. */
 static rl_code read_arguments(rl_tool *tool, comparison *c, rl_error *err)
 {
     const rl_arguments *a = &tool->args;
     int metric = -1;
-    if (a->metric && find_metric("metric", a->metric, &metric, err))
+    if (a->metric && rl_threshold_metric(place, "metric", a->metric, &metric, err))
         return err->code;
     c->metric = metric < 0 ? RL_METRICS : (rl_metric)metric;
     c->thresholds = rl_arena_array(tool->arena, a->n_fail_over + 1, sizeof *c->thresholds);
     if (!c->thresholds)
         return rl_fail_memory(err, a->n_fail_over * sizeof *c->thresholds);
     for (size_t i = 0; i < a->n_fail_over; i++)
-        if (parse_threshold(tool->arena, a->fail_over[i], &c->thresholds[i], err))
+        if (rl_threshold_parse(tool->arena, place, a->fail_over[i], false, &c->thresholds[i], err))
             return err->code;
     if (a->heatmap)
         return rl_image_file_check(a->heatmap, (rl_where){.file = place}, err);
@@ -214,14 +147,13 @@ static rl_code check_thresholds(const rl_tool *tool, const comparison *c, rl_err
 {
     rl_str text = {0};
     for (size_t i = 0; i < tool->args.n_fail_over; i++) {
-        const threshold *t = &c->thresholds[i];
+        const rl_threshold *t = &c->thresholds[i];
         rl_metric metric = t->metric < 0 ? c->metric : (rl_metric)t->metric;
         double v = c->stats[metric][t->stat];
-        bool rises = rl_metric_rises(metric);
-        if (rises ? v >= t->limit : v <= t->limit)
+        if (!rl_threshold_is_over(metric, t->limit, v))
             continue;
         rl_str_printf(&text, "%s%s.%s is %.6g, %s %g", text.length ? "; " : "", rl_metric_name(metric),
-                      rl_stat_name(t->stat), v, rises ? "under" : "over", t->limit);
+                      rl_stat_name(t->stat), v, rl_metric_rises(metric) ? "under" : "over", t->limit);
     }
     if (text.length || text.failed)
         rl_fail_file(err, RL_E_DATA, tool->args.second, "%s", rl_str_text(&text));

@@ -8,7 +8,7 @@
 #include "graph/tool/markdown.h"
 #include "graph/tool/tool.h"
 
-static const char *const role_names[] = {"in", "out", "history", "scratch"};
+static const char *const role_names[] = {"in", "out", "history", "scratch", "sums"};
 static const char *const type_names[] = {"number", "integer", "true|false", "word",
                                          "rgb",    "list",    "materials"};
 

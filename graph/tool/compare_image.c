@@ -138,16 +138,19 @@ static void add_channel(rl_compare_image *out, const char *name)
     snprintf(out->channels + used, sizeof out->channels - used, "%s%s", used ? " " : "", name);
 }
 
-static bool is_rec709(const rl_exr *file, int part)
+static void read_space(const rl_exr *file, int part, rl_compare_image *out)
 {
     static const double primaries[8] = {0.64, 0.33, 0.3, 0.6, 0.15, 0.06, 0.3127, 0.329};
     rl_exr_value value;
+    if (rl_exr_attr(file, part, "relit:colorspace", &value) && value.type == RL_EXR_T_STRING)
+        snprintf(out->space, sizeof out->space, "%s", value.text);
+    out->rec709 = true;
     if (!rl_exr_attr(file, part, "chromaticities", &value) || value.type != RL_EXR_T_CHROMATICITIES)
-        return true;
+        return;
+    out->has_xy = true;
+    memcpy(out->xy, value.v, sizeof out->xy);
     for (int i = 0; i < 8; i++)
-        if (fabs(value.v[i] - primaries[i]) > 1e-3)
-            return false;
-    return true;
+        out->rec709 = out->rec709 && !(fabs(value.v[i] - primaries[i]) > 1e-3);
 }
 
 static rl_code read_exr(const char *path, rl_pool *pool, rl_compare_image *out, rl_error *err)
@@ -171,7 +174,7 @@ static rl_code read_exr(const char *path, rl_pool *pool, rl_compare_image *out, 
     out->x = part->data_window.x0;
     out->y = part->data_window.y0;
     out->data = l.n != 1 && !is_rgb(&l);
-    out->rec709 = is_rec709(file, l.part);
+    read_space(file, l.part, out);
     rl_exr_read(file, l.part, planes, (size_t)l.n, NULL, pool, err);
 done:
     rl_exr_close(&file);
@@ -206,7 +209,8 @@ static rl_code read_other(const char *path, rl_compare_image *out, rl_error *err
             add_channel(out, name[c]);
         out->x = file.x;
         out->y = file.y;
-        out->view.encoded = file.type == RL_IMAGE_U8 || file.type == RL_IMAGE_U16;
+        out->levels = file.type == RL_IMAGE_U8 ? 255 : file.type == RL_IMAGE_U16 ? 65535 : 0;
+        out->view.encoded = out->levels > 0;
         out->data = channels != 1 && channels != 3;
         out->rec709 = true;
     }

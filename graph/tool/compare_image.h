@@ -12,7 +12,11 @@ typedef struct rl_compare_image {
     int x, y;           /* of the first pixel in the display window */
     bool data;          /* neither RGB nor a single channel, such as a normal: colour metrics do not apply */
     char channels[160]; /* "R G B" */
+    int levels;         /* of integers: 255, 65535; 0: floats */
     bool rec709;        /* false: the file has chromaticities, and they are others */
+    bool has_xy;        /* the file has chromaticities: */
+    double xy[8];       /* x, y of red, green, blue, white */
+    char space[64];     /* relit:colorspace, or "" */
 } rl_compare_image;
 
 /* 8 and 16 bits an sample are taken as sRGB-encoded, half, float and uint as linear. Errors name the file:

@@ -13,6 +13,26 @@ static const command commands[] = {
       "outputs. A file under its final name is whole. A frame that fails does not stop\n"
       "the others.\n"},
      rl_cmd_run},
+    {{"ab", RL_CMD_AB, "PIPELINE...", "compare variants; write a report",
+      "Runs variants of a pipeline together (--vary), or several pipelines, or every\n"
+      "variant of each. What they share runs once; their pictures have the same bits\n"
+      "as runs of their own, and go to a folder each below --out.\n"
+      "\n"
+      "    relit ab configs/skin.yaml --vary profiles.skin.texturing=post,pre_post\n"
+      "    relit ab a.yaml b.yaml --frames 1-24 --fail-over flip.p95=0.05\n"
+      "    relit ab p.yaml --vary graph.sss.taps=8,16,21,40,55 --sheet\n"
+      "    relit ab p.yaml --vary graph.sss.pass=sss_burley,sss_gaussian,combine\n"
+      "\n"
+      "report.html shows where they differ (one file, opens offline), metrics.json\n"
+      "has every number, junit.xml is for CI. Each variant is compared with the first\n"
+      "one; --pairs and --against choose others. Where chance has a part, the first\n"
+      "variant runs with other seeds too, and differences that chance explains are\n"
+      "marked. A pass that --vary graph.NODE.pass puts in place of another drops the\n"
+      "parameters and inputs that it lacks, and says so.\n"
+      "\n"
+      "--fail-over METRIC.STAT=X, such as flip.p95=0.05 or psnr.mean=40, is about every\n"
+      "frame and material; energy=X about the light that a pass loses or makes.\n"},
+     rl_cmd_ab},
     {{"diff", RL_CMD_DIFF, "A B", "compare an image with a reference",
       "Compares image B with the reference A and prints mean, median, 95th percentile\n"
       "and maximum of a metric. EXR files: channels R, G, B, or the only layer. A file\n"
@@ -23,7 +43,9 @@ static const command commands[] = {
       "Reads the pipeline, opens the headers of the capture, makes the plan and\n"
       "compiles the kernels. Writes nothing.\n"},
      rl_cmd_check},
-    {{"plan", RL_CMD_PLAN, "PIPELINE", "show the graph: order, lifetimes, memory, culled passes", NULL},
+    {{"plan", RL_CMD_PLAN, "PIPELINE...", "show the graph: order, lifetimes, memory, culled passes",
+      "With --vary, or with several pipelines: what the variants share when `relit ab`\n"
+      "runs them together, and what that costs against running one.\n"},
      rl_cmd_plan},
     {{"init", RL_CMD_INIT, "CAPTURE", "print a starter pipeline for a capture",
       "CAPTURE is a capture.yaml, a folder that holds one, or an EXR file or pattern.\n"
@@ -56,6 +78,24 @@ int rl_tool_print(rl_tool *tool, rl_str *s, rl_error *err)
     return err->code ? RL_EXIT_WRONG : RL_EXIT_DONE;
 }
 
+/* "relit ab configs/skin.yaml --vary 'a=[1, 2],3'". NULL when memory is out. */
+static const char *command_line(rl_arena *arena, int argc, char **argv)
+{
+    static const char plain[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-./=,:+@%";
+    rl_str s = {0};
+    rl_str_add(&s, "relit");
+    for (int i = 1; i < argc; i++) {
+        bool quoted = !*argv[i] || argv[i][strspn(argv[i], plain)];
+        rl_str_add(&s, quoted ? " '" : " ");
+        for (const char *c = argv[i]; *c; c++)
+            rl_str_addn(&s, *c == '\'' ? "'\\''" : c, *c == '\'' ? 4 : 1);
+        rl_str_add(&s, quoted ? "'" : "");
+    }
+    const char *line = s.failed ? NULL : rl_arena_strdup(arena, rl_str_text(&s));
+    rl_str_free(&s);
+    return line;
+}
+
 static int run_command(rl_tool *tool, const rl_commands *infos, int argc, char **argv, rl_error *err)
 {
     size_t index;
@@ -68,6 +108,11 @@ static int run_command(rl_tool *tool, const rl_commands *infos, int argc, char *
         rl_str text = {0};
         rl_help_command(&c->info, &text);
         return rl_tool_print(tool, &text, err);
+    }
+    tool->command = command_line(tool->arena, argc, argv);
+    if (!tool->command) {
+        rl_fail_memory(err, 256);
+        return RL_EXIT_WRONG;
     }
     tool->args.run.pipeline = tool->args.operand;
     tool->args.run.log = &tool->report->log;

@@ -6,7 +6,7 @@
 #include "graph/model/graph.h"
 #include "graph/model/params.h"
 
-static const char *const role_names[] = {"in", "out", "history", "scratch"};
+static const char *const role_names[] = {"in", "out", "history", "scratch", "sums"};
 
 /* Text as a table's cell holds it: a bar would end the cell, and <, > and * mean something to Markdown. */
 static void add_cell(rl_str *out, const char *text)

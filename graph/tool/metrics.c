@@ -107,24 +107,30 @@ static rl_code check_images(rl_metric metric, const rl_metric_image *a, const rl
     return RL_OK;
 }
 
+rl_code rl_metric_maps(rl_metric metric, const rl_metric_image *reference, const rl_metric_image *tests,
+                       size_t n, rl_pool *pool, float *const *maps, rl_error *err)
+{
+    for (size_t i = 0; i < n; i++)
+        if (check_images(metric, reference, &tests[i], err))
+            return err->code;
+    if (metric == RL_METRIC_FLIP)
+        return rl_flip_maps(reference, tests, n, pool, maps, err);
+    if (metric == RL_METRIC_HDRFLIP)
+        return rl_hdrflip_maps(reference, tests, n, pool, maps, err);
+    for (size_t i = 0; i < n; i++) {
+        difference_job job = {metric, reference, &tests[i], maps[i]};
+        if (metric != RL_METRIC_SSIM)
+            rl_filter_bands(pool, reference->height, difference_row, &job);
+        else if (rl_ssim_map(reference, &tests[i], pool, maps[i], err))
+            return err->code;
+    }
+    return RL_OK;
+}
+
 rl_code rl_metric_map(rl_metric metric, const rl_metric_image *reference, const rl_metric_image *test,
                       rl_pool *pool, float *map, rl_error *err)
 {
-    difference_job job = {metric, reference, test, map};
-    rl_code code = check_images(metric, reference, test, err);
-    if (code)
-        return code;
-    switch (metric) {
-    case RL_METRIC_FLIP:
-        return rl_flip_map(reference, test, pool, map, err);
-    case RL_METRIC_HDRFLIP:
-        return rl_hdrflip_map(reference, test, pool, map, err);
-    case RL_METRIC_SSIM:
-        return rl_ssim_map(reference, test, pool, map, err);
-    default:
-        rl_filter_bands(pool, reference->height, difference_row, &job);
-        return RL_OK;
-    }
+    return rl_metric_maps(metric, reference, test, 1, pool, &map, err);
 }
 
 /* ---- statistics ---------------------------------------------------------------------------------------- */
@@ -141,11 +147,13 @@ double rl_metric_peak(const rl_metric_image *reference)
     return peak;
 }
 
-static double percentile(float *values, size_t n, double p)
+/* Percentiles in ascending order: what an earlier one left before *from is not above what is behind. */
+static double percentile(float *values, size_t n, double p, size_t *from)
 {
     double rank = p * (double)(n - 1);
     size_t k = (size_t)rank;
-    double low = (double)rl_select(values, n, k), high = low;
+    double low = (double)rl_select(values + *from, n - *from, k - *from), high = low;
+    *from = k;
     if (k + 1 < n) { /* the smallest of those behind */
         high = (double)values[k + 1];
         for (size_t i = k + 2; i < n; i++)
@@ -169,26 +177,35 @@ static double mean_of(rl_metric metric, const float *values, size_t n, double pe
     return sum > 0 ? 20 * log10(fmax(peak, 0)) - 10 * log10(sum) : HUGE_VAL;
 }
 
+void rl_metric_stats_of(rl_metric metric, float *values, size_t n, double peak, double out[RL_STATS])
+{
+    for (int i = 0; i < RL_STATS; i++)
+        out[i] = NAN;
+    if (!n)
+        return;
+    out[RL_STAT_MEAN] = mean_of(metric, values, n, peak);
+    if (metric == RL_METRIC_PSNR)
+        return;
+    size_t from = 0;
+    out[RL_STAT_MEDIAN] = percentile(values, n, 0.5, &from);
+    out[RL_STAT_P95] = percentile(values, n, 0.95, &from);
+    float most = values[from];
+    for (size_t i = from + 1; i < n; i++)
+        most = values[i] > most ? values[i] : most;
+    out[RL_STAT_MAX] = (double)most;
+}
+
 rl_code rl_metric_stats(rl_metric metric, const float *map, const uint8_t *mask, size_t n, double peak,
                         double out[RL_STATS], rl_error *err)
 {
     float *values = rl_malloc(n * sizeof *values);
     size_t count = 0;
-    for (int i = 0; i < RL_STATS; i++)
-        out[i] = NAN;
     if (!values)
         return rl_fail_memory(err, n * sizeof *values);
     for (size_t i = 0; i < n; i++)
         if ((!mask || mask[i]) && !isnan(map[i]))
             values[count++] = map[i];
-    if (count) {
-        out[RL_STAT_MEAN] = mean_of(metric, values, count, peak);
-        if (metric != RL_METRIC_PSNR) {
-            out[RL_STAT_MEDIAN] = percentile(values, count, 0.5);
-            out[RL_STAT_P95] = percentile(values, count, 0.95);
-            out[RL_STAT_MAX] = percentile(values, count, 1);
-        }
-    }
+    rl_metric_stats_of(metric, values, count, peak, out);
     rl_free(values);
     return RL_OK;
 }

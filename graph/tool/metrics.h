@@ -66,6 +66,11 @@ typedef struct rl_metric_image {
 rl_code rl_metric_map(rl_metric metric, const rl_metric_image *reference, const rl_metric_image *test,
                       rl_pool *pool, float *map, rl_error *err);
 
+/* The same for n test images against one reference, whose share of the work is done once: maps[i] is that of
+ * tests[i], with the same bits as rl_metric_map. */
+rl_code rl_metric_maps(rl_metric metric, const rl_metric_image *reference, const rl_metric_image *tests,
+                       size_t n, rl_pool *pool, float *const *maps, rl_error *err);
+
 /* What psnr takes as its peak: 1 for encoded images, the largest value of the reference for linear ones. */
 double rl_metric_peak(const rl_metric_image *reference);
 
@@ -74,6 +79,9 @@ double rl_metric_peak(const rl_metric_image *reference);
  * images is +∞. `peak` is for psnr alone. RL_E_MEMORY. */
 rl_code rl_metric_stats(rl_metric metric, const float *map, const uint8_t *mask, size_t n, double peak,
                         double out[RL_STATS], rl_error *err);
+
+/* The same of n values without NaN, which are reordered; allocates nothing. */
+void rl_metric_stats_of(rl_metric metric, float *values, size_t n, double peak, double out[RL_STATS]);
 
 /* The exposures of HDR-FLIP, in stops: first + i · (last - first) / (n - 1), i = 0 … n - 1. They map the
  * largest and the median luminance of the reference to 0.85 through the tone curve. The paper leaves a median

@@ -19,14 +19,16 @@ typedef enum rl_command_bit {
     RL_CMD_PASSES = 32,
     RL_CMD_DEVICES = 64,
     RL_CMD_BENCH = 128,
-    RL_CMD_DIFF = 256
+    RL_CMD_DIFF = 256,
+    RL_CMD_AB = 512
 } rl_command_bit;
 
 /* A command as the parser and the help see it. */
 typedef struct rl_command_info {
     const char *name;
     rl_command_bit bit;
-    const char *operand; /* "PIPELINE", "[NAME]" (may be left out), "A B" (two), or NULL: takes none */
+    const char *operand; /* "PIPELINE", "[NAME]" (may be left out), "A B" (two), "PIPELINE..." (one or
+                            more), or NULL: takes none */
     const char *help;    /* one line */
     const char *more;    /* paragraphs for `relit NAME --help`, lines under 80 columns, or NULL */
 } rl_command_info;
@@ -36,12 +38,14 @@ typedef struct rl_commands {
     size_t n;
 } rl_commands;
 
-typedef enum rl_plan_word { RL_WORD_TEXT, RL_WORD_DOT, RL_WORD_SVG, RL_WORD_JSON } rl_plan_word;
+typedef enum rl_plan_word { RL_WORD_TEXT, RL_WORD_DOT, RL_WORD_SVG, RL_WORD_JSON, RL_WORD_HTML } rl_plan_word;
 
 /* What was asked for. Lists live in the arena that rl_arguments_parse was given, strings in argv or there. */
 typedef struct rl_arguments {
-    const char *operand;    /* or NULL */
-    const char *second;     /* of two, or NULL */
+    const char *operand;         /* or NULL */
+    const char *second;          /* of two, or NULL */
+    const char *const *operands; /* of one or more, operand the first; else none */
+    size_t n_operands;
     rl_options run;         /* handed to rl_session_open as it is, after .pipeline and .log are set */
     const char *trace;      /* or NULL */
     int size[2];            /* bench: width, height; 0 = the capture's */
@@ -49,6 +53,12 @@ typedef struct rl_arguments {
     const char *metric, *heatmap;
     const char *const *fail_over; /* "flip.p95=0.05", "0.02" */
     size_t n_fail_over;
+    const char *const *vary; /* "graph.sss.taps=8,16" */
+    size_t n_vary;
+    const char *against, *report_frames; /* or NULL */
+    const char *sheet;                   /* NULL: none; "": under its default name */
+    int seeds;                           /* 0: as the default */
+    bool pairs;
     bool json, markdown, quiet, verbose, help;
 } rl_arguments;
 

@@ -72,7 +72,7 @@ static void sink(void *ctx, rl_severity severity, rl_where where, const char *te
 
 void rl_reporter_begin(rl_reporter *r, FILE *out, FILE *err)
 {
-    *r = (rl_reporter){.out = out, .err = err, .log = {sink, r}};
+    *r = (rl_reporter){.out = out, .err = err, .resumes = true, .log = {sink, r}};
     const char *term = getenv("TERM"), *no_color = getenv("NO_COLOR");
     int fd = fileno(err);
     r->terminal = fd >= 0 && isatty(fd) && term && strcmp(term, "dumb");
@@ -142,11 +142,16 @@ static void frame_json(rl_reporter *r, const rl_frame_result *f)
         error = json_pack("{s:s, s:o, s:i, s:i, s:o}", "code", rl_code_name(f->error->code), "file",
                           json_text(f->error->file), "line", f->error->line, "column", f->error->column,
                           "text", json_text(f->error->text));
-    json_t *object = json_pack(
-        "{s:o, s:I, s:b, s:o, s:o, s:I, s:I, s:f, s:f, s:f, s:I, s:I}", "capture", json_text(f->capture),
-        "frame", (json_int_t)f->frame, "ok", !(f->error && f->error->code), "files", files, "error", error,
-        "nonfinite", (json_int_t)f->nonfinite, "clamped", (json_int_t)f->clamped, "load_s", f->load_s,
-        "run_s", f->run_s, "write_s", f->write_s, "done", (json_int_t)f->done, "total", (json_int_t)f->total);
+    json_t *object =
+        json_pack("{s:o, s:I, s:b, s:o, s:o}", "capture", json_text(f->capture), "frame",
+                  (json_int_t)f->frame, "ok", !(f->error && f->error->code), "files", files, "error", error);
+    if (f->load_s >= 0) /* one pipeline's frame */
+        json_object_update_new(object,
+                               json_pack("{s:I, s:I, s:f, s:f, s:f}", "nonfinite", (json_int_t)f->nonfinite,
+                                         "clamped", (json_int_t)f->clamped, "load_s", f->load_s, "run_s",
+                                         f->run_s, "write_s", f->write_s));
+    json_object_update_new(
+        object, json_pack("{s:I, s:I}", "done", (json_int_t)f->done, "total", (json_int_t)f->total));
     char *text = object ? json_dumps(object, JSON_COMPACT | JSON_REAL_PRECISION(6)) : NULL;
     if (text)
         fprintf(r->out, "%s\n", text);
@@ -158,8 +163,11 @@ static void frame_json(rl_reporter *r, const rl_frame_result *f)
 static void frame_line(rl_reporter *r, const rl_frame_result *f)
 {
     fprintf(r->err, "[%zu/%zu] %s frame %lld:", f->done, f->total, f->capture, f->frame);
-    for (size_t i = 0; i < f->n_files; i++)
+    bool many = f->load_s < 0 && f->n_files > 4; /* of many variants, which --json lists */
+    for (size_t i = 0; i < f->n_files && !many; i++)
         fprintf(r->err, " %s", f->files[i]);
+    if (many)
+        fprintf(r->err, " %zu files", f->n_files);
     fprintf(r->err, "%s\n", f->n_files ? "" : " nothing written");
     fflush(r->err);
 }
@@ -242,10 +250,8 @@ void rl_report_run_end(rl_reporter *r, const rl_run_summary *s, bool stopped)
     pthread_mutex_lock(&r->lock);
     hide_bar(r);
     if (stopped)
-        fprintf(r->err,
-                "stopped: %zu frames were finished, the others were not begun; the same command with "
-                "--resume goes on\n",
-                s->frames);
+        fprintf(r->err, "stopped: %zu frames were finished, the others were not begun%s\n", s->frames,
+                r->resumes ? "; the same command with --resume goes on" : "");
     if (s->failed)
         fprintf(r->err, "%zu of %zu frames failed:\n%s", s->failed, s->frames, rl_str_text(&r->failed));
     if (!r->quiet)

@@ -16,6 +16,7 @@ enum { RL_REPORT_SEEN = 256 };
 typedef struct rl_reporter {
     FILE *out, *err;
     bool quiet, verbose, json; /* set once the command line is read */
+    bool resumes;              /* a run that was stopped can go on with --resume; true at first */
     bool terminal, color;      /* of err */
     pthread_mutex_t lock;
     rl_log log;                    /* hand &log to whatever reports; any thread */

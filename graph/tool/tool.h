@@ -11,7 +11,8 @@
 typedef struct rl_tool {
     rl_arguments args;
     rl_reporter *report;
-    rl_arena *arena; /* lives as long as the command */
+    rl_arena *arena;     /* lives as long as the command */
+    const char *command; /* the command line, quoted as for a shell: for reports */
 } rl_tool;
 
 /* Exit statuses; a signal that stopped a run is 128 + its number. */
@@ -31,6 +32,7 @@ int rl_cmd_init(rl_tool *tool, rl_error *err);
 int rl_cmd_inspect(rl_tool *tool, rl_error *err);
 int rl_cmd_passes(rl_tool *tool, rl_error *err);
 int rl_cmd_devices(rl_tool *tool, rl_error *err);
+int rl_cmd_ab(rl_tool *tool, rl_error *err);
 int rl_cmd_diff(rl_tool *tool, rl_error *err);
 int rl_cmd_bench(rl_tool *tool, rl_error *err);
 
