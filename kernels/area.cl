@@ -7,8 +7,8 @@
  * from its middle with the lobe itself, so that far off it is a point light's.
  *
  * Errors against integrals over the light in double (tests/test_area_lights.c): Lambert 1e-4 of the light's own when it
- * faces the surface; F_in of Disney's diffuse, a mean over 7 or 9 points, 0.01; GGX as the table's fit says. Visibility is
- * that of the light's middle. */
+ * faces the surface; F_in of Disney's diffuse, a mean over 7 or 9 points, 0.01; GGX 0.06 of the brightest reflection, 0.01
+ * on average. At 10 cm from a panel of 80 x 60 cm the last two are 0.09 and 0.12. Visibility is that of the light's middle. */
 
 #if LIGHTS_AREA
 

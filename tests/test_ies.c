@@ -117,6 +117,7 @@ static void bad_files_say_where(void **state)
         assert_string_equal(err.text, rows[i].what);
         assert_string_equal(err.file, "lamp.ies");
         assert_int_equal(err.line, rows[i].line);
+        assert_true(err.column > 0);
     }
     for (size_t n = 0; n < sizeof quarters - 1; n++) { /* cut anywhere: an error or a table, nothing else */
         char text[sizeof quarters] = {0};

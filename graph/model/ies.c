@@ -12,7 +12,8 @@ static const double pi = 3.14159265358979323846;
 
 typedef struct reader {
     const char *at, *name;
-    int line;
+    const char *start; /* of the line */
+    int line, column;  /* of the word read last */
     rl_arena *arena;
     rl_error *err;
 } reader;
@@ -25,7 +26,7 @@ typedef struct raw {
 
 static rl_code wrong(const reader *r, int line, const char *what)
 {
-    return rl_fail(r->err, RL_E_FORMAT, (rl_where){r->name, line, 0}, "%s", what);
+    return rl_fail(r->err, RL_E_FORMAT, (rl_where){r->name, line, r->column}, "%s", what);
 }
 
 /* ---- words -----------------------------------------------------------------------------------------------
@@ -41,6 +42,7 @@ static const char *next_line(reader *r)
     char *line = rl_arena_strndup(r->arena, r->at, n);
     r->at += n;
     r->at += *r->at == '\r' && r->at[1] == '\n' ? 2 : *r->at ? 1 : 0;
+    r->start = r->at;
     r->line++;
     return line;
 }
@@ -50,12 +52,14 @@ static rl_code read_number(reader *r, const char *what, double *out)
 {
     char word[64];
     while (*r->at && (isspace((unsigned char)*r->at) || *r->at == ',')) {
-        bool crlf = *r->at == '\r' && r->at[1] == '\n';
-        r->line += *r->at == '\n' || (*r->at == '\r' && !crlf);
+        bool ends = *r->at == '\n' || (*r->at == '\r' && r->at[1] != '\n');
+        r->line += ends;
+        r->start = ends ? r->at + 1 : r->start;
         r->at++;
     }
     size_t n = strcspn(r->at, " \t\r\n\v\f,");
-    rl_where where = {r->name, r->line, 0};
+    r->column = (int)(r->at - r->start) + 1;
+    rl_where where = {r->name, r->line, r->column};
     if (!n)
         return rl_fail(r->err, RL_E_FORMAT, where, "expected %s, found the end of the file", what);
     memcpy(word, r->at, n < sizeof word ? n : sizeof word - 1);
@@ -71,8 +75,8 @@ static rl_code read_count(reader *r, const char *what, int *out)
     double v = 0;
     rl_code code = read_number(r, what, &v);
     if (!code && !(v >= 1 && v <= RL_IES_MOST_ANGLES && v == floor(v)))
-        return rl_fail(r->err, RL_E_FORMAT, (rl_where){r->name, r->line, 0}, "%s: expected 1 to %d, found %g",
-                       what, RL_IES_MOST_ANGLES, v);
+        return rl_fail(r->err, RL_E_FORMAT, (rl_where){r->name, r->line, r->column},
+                       "%s: expected 1 to %d, found %g", what, RL_IES_MOST_ANGLES, v);
     *out = (int)v;
     return code;
 }
@@ -94,7 +98,7 @@ static rl_code read_head(reader *r)
     while (*tilt == ' ')
         tilt++;
     if (strncmp(tilt, "NONE", 4))
-        return rl_fail(r->err, RL_E_FORMAT, (rl_where){r->name, r->line - 1, 0},
+        return rl_fail(r->err, RL_E_FORMAT, (rl_where){r->name, r->line - 1, 6},
                        "TILT=%s: only files with TILT=NONE can be used", tilt);
     return RL_OK;
 }
@@ -117,7 +121,7 @@ static rl_code read_sizes(reader *r, raw *f, double *scale)
     if (!code)
         code = read_number(r, "the photometric type", &type);
     if (!code && type != 1)
-        code = rl_fail(r->err, RL_E_FORMAT, (rl_where){r->name, r->line, 0},
+        code = rl_fail(r->err, RL_E_FORMAT, (rl_where){r->name, r->line, r->column},
                        "photometric type %g (%s): only type C (1) can be used", type,
                        type == 2   ? "B"
                        : type == 3 ? "A"
@@ -146,7 +150,7 @@ static rl_code read_angles(reader *r, const char *what, int n, double **out)
     for (int i = 0; i < n && !code; i++) {
         code = read_number(r, what, &(*out)[i]);
         if (!code && i > 0 && !((*out)[i] > (*out)[i - 1]))
-            code = rl_fail(r->err, RL_E_FORMAT, (rl_where){r->name, r->line, 0},
+            code = rl_fail(r->err, RL_E_FORMAT, (rl_where){r->name, r->line, r->column},
                            "%s do not rise: %g follows %g", what, (*out)[i], (*out)[i - 1]);
     }
     return code;
@@ -161,7 +165,7 @@ static rl_code check_angles(reader *r, const raw *f)
 {
     const double *d = f->down, *h = f->around;
     int v = f->vertical, n = f->horizontal;
-    rl_where where = {r->name, r->line, 0};
+    rl_where where = {r->name, r->line, r->column};
     if (v < 2 || !(spans(d, v, 0, 90) || spans(d, v, 90, 180) || spans(d, v, 0, 180)))
         return rl_fail(r->err, RL_E_FORMAT, where,
                        "vertical angles from %g to %g: of type C they go from 0 to 90, 90 to 180 or 0 to 180",
@@ -266,7 +270,7 @@ static rl_code make_table(rl_arena *arena, const raw *f, double most, rl_ies *ou
 
 rl_code rl_ies_parse(rl_arena *arena, const char *text, const char *name, const rl_ies **out, rl_error *err)
 {
-    reader r = {.at = text, .name = name, .line = 1, .arena = arena, .err = err};
+    reader r = {.at = text, .name = name, .start = text, .line = 1, .column = 1, .arena = arena, .err = err};
     raw f = {0};
     double scale = 0, most = 0;
     rl_ies *ies = rl_arena_alloc(arena, sizeof *ies);
