@@ -202,7 +202,7 @@ static inline void add_area(constant material_t *m, const surface_t *s, constant
         floatv front = sum[FRONT] * entered[0] * r->visibility;
         if (scattered) {
             sg_t sg = sg_make(sg_convolved(k.band1 * sg_band1(s->sharpness[c])));
-            front = k.solid * scatter_visibility(s, r) * sg_irradiance(&sg, dot3(s->bent[c], k.axis));
+            front = mix(front, k.solid * scatter_visibility(s, r) * sg_irradiance(&sg, dot3(s->bent[c], k.axis)), s->blurred[c]);
         }
         if (transmits)
             front = fma(sum[BACK] * entered[1], through_it[c], front);

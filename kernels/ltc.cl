@@ -1,5 +1,5 @@
 /* GGX as a linearly transformed cosine (Heitz et al. 2016; passes/ltc_table.h), and light from polygons under it. Behind
- * surface.cl, in front of area.cl and light_tables.cl. */
+ * surface.cl, in front of area.cl and sky.cl. */
 
 /* ---- the table -------------------------------------------------------------------------------------------- */
 

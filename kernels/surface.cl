@@ -18,7 +18,7 @@ enum { POST, PRE_POST };
 enum { DISNEY, LAMBERT, SG };
 enum { GGX };
 enum { EXIT_IN_SSS, EXIT_IN_LIGHTING };
-enum { OPAQUE, THIN, THICK, BEER_LAMBERT };
+enum { OPAQUE, THIN, THICK, BEER_LAMBERT, GATHER }; /* GATHER: not in the lighting */
 enum { FROM_MAX, FROM_LAYER, FROM_SHADOW };
 
 /* Below this alpha a highlight of a light without size would be narrower than a pixel's worth of normals. */
@@ -33,7 +33,7 @@ typedef struct surface_t {
     floatv radius;           /* of curvature, metres; at most 1e6 */
     floatv bent[3][3];       /* the normal that each channel's scattering sees */
     sg_t sg[3];              /* of a material with SG, and the sharpness */
-    floatv sharpness[3];
+    floatv sharpness[3], blurred[3]; /* blurred: how far scattering counts, 0 where it is under a pixel */
 } surface_t;
 
 typedef struct ray_t {
@@ -136,35 +136,4 @@ static inline floatv lobe(const surface_t *s, const ray_t *r, floatv roughness, 
     floatv smith = nl * sqrt(fma(nv * nv, 1.0f - a2, a2)) + nv * sqrt(fma(nl * nl, 1.0f - a2, a2));
     *fresnel = f2 * f2 * f;
     return a2 * (0.5f / RL_PI) / (denominator * denominator * fmax(smith, 1e-12f));
-}
-
-/* How much of the light on the back face comes through, without cosine, F_in and 1/pi (DESIGN 4.5): the slab of
- * Golubev 2018, (e^-st + 3 e^-st/3) / 4, or Helix's Beer-Lambert law. `back` is |n.l| there. */
-static inline void through(constant material_t *m, const surface_t *s, const ray_t *r, floatv back, floatv *out)
-{
-    const float log2_e = 1.44269504f;
-    int mode = m->profile_transmission;
-    floatv along = r->shadow_thickness * back; /* from the light's ray to the normal */
-    floatv known = rl_select(along, s->thickness, s->thickness > 0.0f);
-    floatv t = known, visibility = 1.0f;
-    if (mode == THIN) {
-        visibility = r->visibility; /* of both faces; but the object itself is no shadow on its back */
-        if (r->has_thickness)
-            visibility = rl_select(visibility, 1.0f, along <= 2.0f * s->thickness + 1e-3f);
-    } else if (m->profile_thickness_from == FROM_SHADOW) {
-        t = along;
-    } else if (m->profile_thickness_from == FROM_MAX) {
-        t = fmax(s->thickness, along);
-    }
-    visibility = rl_select(0.0f, visibility, t > 0.0f); /* unknown: nothing */
-    for (int i = 0; i < 3; i++) {
-        if (mode == BEER_LAMBERT) {
-            float k = log2(m->profile_transmittance_color[i]) / (1e-3f * m->profile_transmittance_distance_mm);
-            out[i] = visibility * rl_exp2(t * k);
-        } else {
-            float k = -log2_e / (3e-3f * m->profile_scatter_distance_mm[i]);
-            floatv q = rl_exp2(t * k);
-            out[i] = visibility * 0.25f * q * fma(q, q, 3.0f);
-        }
-    }
 }

@@ -38,8 +38,7 @@ static const rl_param profile_keys[] = {
     RL_ROW_SCATTER_DISTANCE(.required_with = "transmission=thin|thick"),
     RL_ROWS_SCATTER_PARAM,
     RL_ROW_TEXTURING,
-    M_ENUM(transmission, "none|thin|thick|beer_lambert", 0, "light that comes through from the back face",
-           .source = "Golubev 2018; Helix"),
+    RL_ROW_TRANSMISSION,
     M_ENUM(thickness_from, "max|layer|shadow", 0,
            "thick, beer_lambert: the thickness layer, shadow_thickness along the normal, or the larger",
            .source = "Golubev 2018"),
@@ -57,9 +56,7 @@ static const rl_param material_keys[] = {
       .no_default = true),
     M(RL_F32, specular, 0, 1, -1, "ratio",
       "reflectance at normal incidence; not given: the specular layer, else 0.04", .no_default = true),
-    M(RL_F32, metallic, 0, 1, -1, "ratio",
-      "1: albedo is the specular colour and nothing is diffuse; not given: the metallic layer, else 0",
-      .no_default = true),
+    RL_ROW_METALLIC,
     M(RL_F32, normal_detail_mm, 0, 1e4, 3, "mm",
       "diffuse: sg: size of the bumps that smooth_normal leaves out, as a standard deviation",
       .source = "d'Eon and Luebke 2007; MJP"),
@@ -68,7 +65,7 @@ static const rl_param material_keys[] = {
 static const rl_param shading_keys[] = {
     RL_ROW_DIFFUSE,
     M_ENUM(specular, "ggx|none", 0, "the specular lobe", .source = "Walter 2007, Heitz 2014"),
-    M(RL_BOOL, transmission, 0, 1, 1, "", "false switches off the transmission that profiles ask for"),
+    RL_ROW_TRANSMIT,
     RL_ROW_EXIT_TRANSMISSION,
 };
 
@@ -133,7 +130,8 @@ const rl_pass rl_pass_lighting = {
     .source = "Golubev 2018; Helix; Walter 2007; Heitz 2014; Heitz et al. 2016",
     .kernel = "lighting.cl",
     .kernel_prelude =
-        "energy.cl sg.cl surface.cl sg_shade.cl screen_shadow.cl ltc.cl area.cl light_tables.cl",
+        "energy.cl sg.cl surface.cl sg_shade.cl slab.cl screen_shadow.cl ltc.cl area.cl profile.cl "
+        "sky.cl",
     .params = RL_ARRAY(params),
     .params_size = sizeof(lighting_params),
     .profile_keys = RL_ARRAY(profile_keys),

@@ -265,6 +265,10 @@ typedef struct rl_pass {
      * holds elsewhere. */
     double (*least_share)(const void *params);
     const char *fades_where;
+    /* "transmission: gather", a profile key of the pass and a word of it, that no other pass fulfils: a graph
+     * that reads the key elsewhere needs this pass too (graph.h). A shading key of that name that is false
+     * switches it off. NULL: there is no such word. */
+    const char *fulfils;
     /* Passes with a parameter `seed`: whether the result depends on it; `march`: some light has `shadow:
      * screen`. NULL: it always does. */
     bool (*stochastic)(const void *params, bool march);
