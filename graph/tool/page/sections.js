@@ -164,17 +164,17 @@ class Sections {
       if (!groups.has(key)) groups.set(key, {...r, n: 0, sums: {}});
       const g = groups.get(key);
       g.n++;
-      for (const k of ["in", "out", "border", "off_screen", "clamped"]) g.sums[k] = (g.sums[k] || 0) + (sum(r[k]) || 0);
+      for (const k of ["in", "out", "border", "off_screen", "clamped", "redistributed"]) g.sums[k] = (g.sums[k] || 0) + (sum(r[k]) || 0);
     }
     const part = (g, k) => (g.sums.in > 0 ? fixed(100 * g.sums[k] / g.sums.in, 2) + THIN + "%" : NONE);
-    const head = ["Node", "Variant", "Material", "In", "Out", "At borders", "Off screen", "Clamped"], many = this.metrics.captures.length > 1;
+    const head = ["Node", "Variant", "Material", "In", "Out", "At borders", "Off screen", "Clamped", "Given back"], many = this.metrics.captures.length > 1;
     return this.section("energy", "Energy", h("p", {class: "small"}, "Mean of red, green and blue, and of the frames; shares of what came in."),
       h("div", {class: "scroll", tabindex: 0, role: "region", "aria-label": "Table of the energy"}, h("table", {},
         h("thead", {}, h("tr", {}, many ? h("th", {scope: "col"}, "Capture") : null, head.map((x, i) => h("th", {scope: "col", class: i > 2 ? "num" : null}, x)))),
         h("tbody", {}, [...groups.values()].map(g => h("tr", {class: g.material === null ? "whole" : null},
           many ? h("td", {}, (this.metrics.captures[g.capture] || {}).name) : null,
           h("th", {scope: "row"}, g.node, h("small", {}, " " + (g.pass || ""))), h("td", {}, (this.metrics.variants[g.variant] || {}).name), h("td", {}, materialName(g.material)),
-          h("td", {class: "num"}, number(g.sums.in / g.n)), ["out", "border", "off_screen", "clamped"].map(k => h("td", {class: "num"}, part(g, k)))))))));
+          h("td", {class: "num"}, number(g.sums.in / g.n)), ["out", "border", "off_screen", "clamped", "redistributed"].map(k => h("td", {class: "num"}, part(g, k)))))))));
   }
 
   /* ---- cost ---- */
