@@ -16,11 +16,11 @@ static inline floatv back_visibility(const surface_t *s, const ray_t *r, floatv 
     return rl_select(r->visibility, 1.0f, r->shadow_thickness * r->nl <= fma(2.0f, thickness, 1e-3f));
 }
 
-/* E F_in of all lights, a channel. `thickness` is the way from front to back along the back's normal. */
+/* E F_in of all lights, a channel; area lights from their middle. `thickness` is the way from front to back along the back's normal. */
 static inline void sum_back_lights(constant material_t *m, const surface_t *s, constant frame_t *f,
                                    constant light_t *lights, global const float *shadow,
                                    global const float *shadow_thickness, floatv thickness, int at,
-                                   floatv *sum)
+                                   global const float *profiles, floatv *sum)
 {
     for (int i = 0; i < f->lights; i++) {
         constant light_t *light = &lights[i];
@@ -28,6 +28,10 @@ static inline void sum_back_lights(constant material_t *m, const surface_t *s, c
         aim(&r, s, light, &f->camera);
         if (!rl_any(r.nl > 0.0f))
             continue;
+#if LIGHTS_PROFILE
+        if (light->profile)
+            r.falloff *= profile_at(profiles, light, r.l);
+#endif
         r.has_thickness =
             HAS_shadow && light->shadow >= 0 && HAS_shadow_thickness && light->shadow_thickness >= 0;
         if (r.has_thickness) {
@@ -57,7 +61,8 @@ kernel void back_lighting(global const float *albedo, global const float *back_a
                           global const float *shadow_thickness, global const float *metallic,
                           global float *diffuse, constant params_t *p, constant frame_t *f,
                           constant material_t *materials, constant light_t *lights,
-                          constant ambient_t *ambient)
+                          constant ambient_t *ambient, global const float *profiles,
+                          global const float *sky)
 {
     int x = RL_W * (int)get_global_id(0), y = (int)get_global_id(1), at = rl_index(f, x, y);
     intv left = rl_as_intv(rl_load_id(stencil, at)), id = left;
@@ -82,7 +87,7 @@ kernel void back_lighting(global const float *albedo, global const float *back_a
         left &= ~mine;
         if (!m->has_profile || !m->shading_transmission || m->profile_transmission != GATHER)
             continue;
-        sum_back_lights(m, &s, f, lights, shadow, shadow_thickness, thickness, at, sum);
+        sum_back_lights(m, &s, f, lights, shadow, shadow_thickness, thickness, at, profiles, sum);
         if (ambient->on)
             add_sky(m, &s, ambient, sum);
         floatv metal = HAS_metallic ? rl_load(metallic, at) : (floatv)0.0f;

@@ -1,86 +1,98 @@
-/* Light on the G-buffer, behind sg.cl, surface.cl, sg_shade.cl and screen_shadow.cl. */
+/* Light on the G-buffer, behind what passes/lighting.c names. */
 
-/* How much of the light on the back face comes through, without cosine, F_in and 1/pi (DESIGN 4.5): the slab of
- * Golubev 2018, (e^-st + 3 e^-st/3) / 4, or Helix's Beer-Lambert law. `back` is |n.l| there. */
-static inline void through(constant material_t *m, const surface_t *s, const ray_t *r, floatv back, floatv *out)
+/* What a pixel's light is computed from, besides its surface and material. */
+typedef struct source_t {
+    constant params_t *p;
+    constant frame_t *f;
+    constant light_t *lights;
+    constant ambient_t *ambient;
+    global const float *depth, *shadow, *shadow_thickness, *profiles, *sky;
+    constant const float *tables;
+} source_t;
+
+/* Visibility of light i, and what is known of the way through the object. `inside` is wanted too. */
+static inline void look(ray_t *r, const surface_t *s, const source_t *from, constant light_t *light, int i, int inside, int x,
+                        int y)
 {
-    const float log2_e = 1.44269504f;
-    int mode = m->profile_transmission;
-    floatv along = r->shadow_thickness * back; /* from the light's ray to the normal */
-    floatv known = rl_select(along, s->thickness, s->thickness > 0.0f);
-    floatv t = known, visibility = 1.0f;
-    if (mode == THIN) {
-        visibility = r->visibility; /* of both faces; but the object itself is no shadow on its back */
-        if (r->has_thickness)
-            visibility = rl_select(visibility, 1.0f, along <= 2.0f * s->thickness + 1e-3f);
-    } else if (m->profile_thickness_from == FROM_SHADOW) {
-        t = along;
-    } else if (m->profile_thickness_from == FROM_MAX) {
-        t = fmax(s->thickness, along);
+    int at = rl_index(from->f, x, y);
+    r->visibility = 1.0f;
+    r->shadow_thickness = 0.0f;
+    r->has_thickness = 0;
+    if (HAS_shadow && light->shadow >= 0)
+        r->visibility = rl_load(from->shadow, light->shadow * from->f->plane + at);
+    if (LIGHTS_MARCH && light->shadow == SHADOW_MARCH)
+        r->visibility = march(from->depth, from->p, from->f, light, s->z, s->here & (r->nl > 0.0f) & (r->falloff > 0.0f), i, x, y);
+    if (HAS_shadow_thickness && inside && light->shadow_thickness >= 0) {
+        r->shadow_thickness = rl_load(from->shadow_thickness, light->shadow_thickness * from->f->plane + at);
+        r->has_thickness = 1;
     }
-    visibility = rl_select(0.0f, visibility, t > 0.0f); /* unknown: nothing */
-    for (int i = 0; i < 3; i++) {
-        if (mode == BEER_LAMBERT) {
-            float k = log2(m->profile_transmittance_color[i]) / (1e-3f * m->profile_transmittance_distance_mm);
-            out[i] = visibility * rl_exp2(t * k);
-        } else {
-            float k = -log2_e / (3e-3f * m->profile_scatter_distance_mm[i]);
-            floatv q = rl_exp2(t * k);
-            out[i] = visibility * 0.25f * q * fma(q, q, 3.0f);
+}
+
+/* A light without size. */
+static inline void add_point(constant material_t *m, const surface_t *s, constant light_t *light, const ray_t *r, int transmits,
+                             int scattered, floatv *diffuse, floatv *specular)
+{
+    floatv entered = r->falloff * transmit(m->shading_diffuse, r->nl);
+    floatv lit = r->falloff * r->visibility * fmax(r->nl, 0.0f);
+    floatv front = entered * r->visibility * fmax(r->nl, 0.0f);
+    for (int c = 0; c < 3; c++) {
+        floatv e = front;
+        if (scattered)
+            e = mix(front, r->falloff * scatter_visibility(s, r) * sg_irradiance(&s->sg[c], dot3(s->bent[c], r->l)), s->blurred[c]);
+        diffuse[c] += light->intensity[c] * e;
+    }
+    if (transmits && rl_any(r->nl < 0.0f)) {
+        floatv back = fmax(-r->nl, 0.0f), t[3];
+        through(m, s, r, back, t);
+        for (int c = 0; c < 3; c++)
+            diffuse[c] += light->intensity[c] * (entered * back * t[c]);
+    }
+    if (m->shading_specular == GGX && rl_any(lit > 0.0f)) {
+        floatv fresnel, dv = lit * lobe(s, r, s->roughness, &fresnel);
+        for (int c = 0; c < 3; c++) {
+            floatv f0 = mix(s->specular, s->albedo[c], s->metallic);
+            specular[c] += light->intensity[c] * dv * fma(1.0f - f0, fresnel, f0);
         }
     }
 }
 
 /* Sums of one material over all lights: E F_in (with what comes through), and the specular radiance. */
-static inline void sum_lights(constant material_t *m, const surface_t *s, constant params_t *p, constant frame_t *f,
-                              constant light_t *lights, global const float *depth, global const float *shadow,
-                              global const float *shadow_thickness, int x, int y, floatv *diffuse, floatv *specular)
+static inline void sum_lights(constant material_t *m, const surface_t *s, const source_t *from, int x, int y, floatv *diffuse,
+                              floatv *specular)
 {
-    int at = rl_index(f, x, y);
     int transmits = m->has_profile && m->shading_transmission && m->profile_transmission != OPAQUE &&
                     m->profile_transmission != GATHER;
     int scattered = scatters(m);
-    for (int i = 0; i < f->lights; i++) {
-        constant light_t *light = &lights[i];
+    ltc_t ltc;
+#if LIGHTS_AREA || LIGHTS_SKY
+    ltc_frame(&ltc, s);
+    if (m->shading_specular == GGX)
+        ltc_values(&ltc, from->tables, s->roughness, fmax(s->nv, 0.0f));
+#endif
+    for (int i = 0; i < from->f->lights; i++) {
+        constant light_t *light = &from->lights[i];
         ray_t r;
-        aim(&r, s, light, &f->camera);
-        if (!transmits && !scattered && !rl_any(r.nl > 0.0f))
+        aim(&r, s, light, &from->f->camera);
+        int area = LIGHTS_AREA && light->type >= LIGHT_SPHERE;
+        if (!transmits && !scattered && !rl_any(r.nl > (area ? -light->radius * r.inverse : (floatv)0.0f)))
             continue;
-        r.visibility = 1.0f;
-        r.shadow_thickness = 0.0f;
-        r.has_thickness = 0;
-        if (HAS_shadow && light->shadow >= 0)
-            r.visibility = rl_load(shadow, light->shadow * f->plane + at);
-        if (LIGHTS_MARCH && light->shadow == SHADOW_MARCH)
-            r.visibility = march(depth, p, f, light, s->z, s->here & (r.nl > 0.0f) & (r.falloff > 0.0f), i, x, y);
-        if (HAS_shadow_thickness && (transmits || scattered) && light->shadow_thickness >= 0) {
-            r.shadow_thickness = rl_load(shadow_thickness, light->shadow_thickness * f->plane + at);
-            r.has_thickness = 1;
+        look(&r, s, from, light, i, transmits || scattered, x, y);
+#if LIGHTS_PROFILE
+        if (light->profile)
+            r.falloff *= profile_at(from->profiles, light, r.l);
+#endif
+#if LIGHTS_AREA
+        if (area) {
+            add_area(m, s, light, &r, &ltc, transmits, scattered, diffuse, specular);
+            continue;
         }
-        floatv entered = r.falloff * transmit(m->shading_diffuse, r.nl);
-        floatv lit = r.falloff * r.visibility * fmax(r.nl, 0.0f);
-        floatv front = entered * r.visibility * fmax(r.nl, 0.0f);
-        for (int c = 0; c < 3; c++) {
-            floatv e = front;
-            if (scattered)
-                e = mix(front, r.falloff * scatter_visibility(s, &r) * sg_irradiance(&s->sg[c], dot3(s->bent[c], r.l)),
-                        s->blurred[c]);
-            diffuse[c] += light->intensity[c] * e;
-        }
-        if (transmits && rl_any(r.nl < 0.0f)) {
-            floatv back = fmax(-r.nl, 0.0f), t[3];
-            through(m, s, &r, back, t);
-            for (int c = 0; c < 3; c++)
-                diffuse[c] += light->intensity[c] * (entered * back * t[c]);
-        }
-        if (m->shading_specular == GGX && rl_any(lit > 0.0f)) {
-            floatv fresnel, dv = lit * lobe(s, &r, s->roughness, &fresnel);
-            for (int c = 0; c < 3; c++) {
-                floatv f0 = mix(s->specular, s->albedo[c], s->metallic);
-                specular[c] += light->intensity[c] * dv * fma(1.0f - f0, fresnel, f0);
-            }
-        }
+#endif
+        add_point(m, s, light, &r, transmits, scattered, diffuse, specular);
     }
+#if LIGHTS_SKY
+    if (from->ambient->sky_levels && m->shading_specular == GGX)
+        add_sky(s, from->ambient, from->sky, &ltc, specular);
+#endif
 }
 
 /* What a material gives wins over the layer of that name, which wins over the default. */
@@ -92,17 +104,14 @@ static inline floatv given(float own, int has_layer, global const float *layer, 
 }
 
 /* One material for a whole vector: what enters (`diffuse`) and what is complete (`lit`). */
-static inline void shade(constant material_t *m, surface_t *s, constant params_t *p, constant frame_t *f,
-                         constant light_t *lights, constant ambient_t *ambient, global const float *depth,
-                         global const float *shadow, global const float *shadow_thickness, int x, int y, floatv *diffuse,
-                         floatv *lit)
+static inline void shade(constant material_t *m, surface_t *s, const source_t *from, int x, int y, floatv *diffuse, floatv *lit)
 {
     floatv sum[3] = {0.0f, 0.0f, 0.0f};
     for (int c = 0; c < 3; c++)
         lit[c] = diffuse[c] = 0.0f;
-    sum_lights(m, s, p, f, lights, depth, shadow, shadow_thickness, x, y, sum, lit);
-    if (ambient->on)
-        add_ambient(m, s, ambient, sum);
+    sum_lights(m, s, from, x, y, sum, lit);
+    if (from->ambient->on)
+        add_ambient(m, s, from->ambient, sum);
     floatv scale = (1.0f / RL_PI) * (1.0f - s->metallic);
     if (!m->has_profile || m->shading_exit_transmission == EXIT_IN_LIGHTING)
         scale *= transmit(m->shading_diffuse, s->nv);
@@ -121,10 +130,12 @@ static inline void shade(constant material_t *m, surface_t *s, constant params_t
         global const float *specular, global const float *metallic, global const float *emission,            \
         global const float *curvature, global const float *smooth_normal, global float *diffuse,             \
         global float *lit, ENERGY_PORT constant params_t *p, constant frame_t *f,                            \
-        constant material_t *materials, constant light_t *lights, constant ambient_t *ambient
+        constant material_t *materials, constant light_t *lights, constant ambient_t *ambient,               \
+        global const float *profiles, global const float *sky, constant const float *tables
 
 kernel void lighting(LIGHTING_PORTS)
 {
+    const source_t from = {p, f, lights, ambient, depth, shadow, shadow_thickness, profiles, sky, tables};
     int x = RL_W * (int)get_global_id(0), y = (int)get_global_id(1), at = rl_index(f, x, y);
     uintv id = rl_load_id(stencil, at);
     uint now = rl_max_id(id);
@@ -151,7 +162,7 @@ kernel void lighting(LIGHTING_PORTS)
         if (scatters(m))
             scatter_surface(m, &s, f, curvature, smooth_normal, at);
         s.here = mask;
-        shade(m, &s, p, f, lights, ambient, depth, shadow, shadow_thickness, x, y, d, l);
+        shade(m, &s, &from, x, y, d, l);
         for (int c = 0; c < 3; c++) {
             out_diffuse[c] = rl_select(out_diffuse[c], d[c], mask);
             if (HAS_emission)

@@ -64,21 +64,36 @@ typedef struct frame_t {
     camera_t previous; /* of the frame that history holds */
 } frame_t;
 
-enum { LIGHT_POINT = 0, LIGHT_SPOT = 1, LIGHT_DIRECTIONAL = 2 };
+enum { LIGHT_POINT = 0, LIGHT_SPOT = 1, LIGHT_DIRECTIONAL = 2, LIGHT_SPHERE = 3, LIGHT_RECT = 4 };
 enum { SHADOW_MARCH = -2 }; /* light_t.shadow: visibility is to be found in the depth buffer */
 
 typedef struct light_t {
     int type;
-    float position[3];          /* world, metres */
+    float position[3];          /* world, metres; of area lights the middle */
     float direction[3];         /* world, unit: where the light travels */
-    float intensity[3];         /* W/sr; directional: W/m2; working space */
+    float intensity[3];         /* W/sr, of a rect along its direction; directional: W/m2; working space */
     float cos_inner, cos_outer; /* spot: full inside, none outside (cosines of half angles) */
     int shadow;                 /* plane of the shadow port, -1: visibility is 1, SHADOW_MARCH */
     int shadow_thickness;       /* plane of the shadow_thickness port, -1: 0 */
+    float radius;               /* metres; of a rect to its corners */
+    float radiance;             /* area lights: of an intensity of 1, 1/m2 */
+    float side[3], top[3]; /* rect: half axes, metres, side x top along direction; others: unit, directions of
+                              a profile's horizontal angles 90 and 0 */
+    int two_sided;         /* rect */
+    int profile;           /* where its table is in the profiles, 0 = none */
 } light_t;
 
+/* A profile: how an intensity changes with direction, 0 to 1. Two numbers, v and h, then v rows of h values:
+ * row i for an angle pi i/(v-1) off the light's direction, column j for 2 pi j/(h-1) around it; h = 1: the
+ * same all around. The buffer of all profiles begins with a number that is none's. */
+
+/* Tables of the lighting pass (passes/ltc_table.h): rows of roughness i/31, of n.v = 1 - (j/31)^2. */
+#define RL_LTC_SIDE   32
+#define RL_LTC_VALUES 8
+
 /* Light from everywhere, without shadows; radiance in the working space, directions in world space. */
-#define RL_LOBES 16
+#define RL_LOBES      16
+#define RL_SKY_LEVELS 11
 typedef struct lobe_t { /* a spherical Gaussian */
     float axis[3];      /* unit, towards the light */
     float sharpness;    /* 1e-3 to 1e4 */
@@ -91,6 +106,13 @@ typedef struct ambient_t {
     float sh[27]; /* coefficient i of channel c at 3 i + c; real orthonormal harmonics, 1 y z x xy yz zz xz
                      xx-yy */
     lobe_t lobe[RL_LOBES];
+    int sky_levels; /* of the sky's mirror images, 0 = none */
+    int sky_side[RL_SKY_LEVELS];
+    int sky_at[RL_SKY_LEVELS];
 } ambient_t;
+
+/* The sky's buffer: level i is what a surface of perceptual roughness i/(sky_levels-1) reflects, an
+ * octahedral image of sky_side[i] pixels with a border of one that repeats what is across the edge, RGB and
+ * an unused number a pixel, from float sky_at[i] on. */
 
 #endif

@@ -37,7 +37,8 @@ typedef struct surface_t {
 } surface_t;
 
 typedef struct ray_t {
-    floatv l[3], nl, falloff; /* towards the light, unit; n.l; 1/d^2 and cone */
+    floatv l[3], nl, falloff; /* towards the light, unit; n.l; 1/d^2 and cone; of area lights' middle */
+    floatv inverse;           /* 1/d; not of directional lights */
     floatv visibility, shadow_thickness;
     int has_thickness; /* shadow_thickness is known */
 } ray_t;
@@ -108,9 +109,14 @@ static inline void aim(ray_t *r, const surface_t *s, constant light_t *light, co
     for (int i = 0; i < 3; i++)
         r->l[i] *= inverse;
     r->nl = to_narrow(nl) * inverse;
+    r->inverse = inverse;
     r->falloff = inverse * inverse;
     if (light->type == LIGHT_SPOT)
         r->falloff *= cone(light, r->l);
+    if (light->type == LIGHT_RECT) { /* seen as a point, from far off */
+        floatv c = -fma(r->l[0], light->direction[0], fma(r->l[1], light->direction[1], r->l[2] * light->direction[2]));
+        r->falloff *= light->two_sided ? fabs(c) : fmax(c, 0.0f);
+    }
 }
 
 /* D V of GGX with the height-correlated Smith term (Heitz 2014), and Schlick's (1 - v.h)^5 in `fresnel`. 1 - (n.h)^2

@@ -49,7 +49,7 @@ const rl_pass rl_pass_back_lighting = {
     .help = "direct and ambient light that enters the closest back face",
     .source = "Golubev 2018, future work",
     .kernel = "back_lighting.cl",
-    .kernel_prelude = "sg.cl surface.cl",
+    .kernel_prelude = "sg.cl surface.cl profile.cl",
     .params = RL_ARRAY(params),
     .params_size = sizeof(back_lighting_params),
     .profile_keys = RL_ARRAY(profile_keys),
@@ -59,5 +59,6 @@ const rl_pass rl_pass_back_lighting = {
     .steps = RL_ARRAY(steps),
     .lights = true,
     .ambient = true,
+    .light_tables = true,
     .cost = cost,
 };

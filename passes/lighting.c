@@ -1,10 +1,15 @@
-/* Light on the G-buffer: point, spot and directional lights, unshadowed ambient light, Lambert's or Disney's
- * diffuse transmission, GGX specular, translucency through a slab.
+/* Light on the G-buffer: point, spot, directional, sphere and rectangle lights, unshadowed ambient light and
+ * the reflection of an HDRI, Lambert's or Disney's diffuse transmission, GGX specular, translucency through a
+ * slab.
  *
  * Golubev 2018 (transmission at entry and exit, texturing modes, thin and thick slabs), Helix (Beer-Lambert),
  * MJP (scattering as spherical Gaussians: the irradiance is complete, and goes into `lit`), Ramamoorthi and
  * Hanrahan 2001 (irradiance of spherical harmonics), McGuire and Mara 2014 (shadows marched in the depth
- * buffer), Walter 2007 and Heitz 2014 (GGX, height-correlated Smith), Schlick 1994 (Fresnel). */
+ * buffer), Walter 2007 and Heitz 2014 (GGX, height-correlated Smith), Schlick 1994 (Fresnel), Heitz et al.
+ * 2016 (area lights: linearly transformed cosines), Karis 2013 (reflections: split sum). */
+#include <string.h>
+
+#include "passes/ltc_table.h"
 #include "passes/shading_rows.h"
 
 typedef struct lighting_params {
@@ -89,6 +94,18 @@ static const rl_port ports[] = {
     RL_PORT_ENERGY,
 };
 
+/* The kernel's only table, the same for all pipelines. */
+static rl_code lighting_tables(const rl_pass_input *in, rl_arena *arena, rl_tables *out, rl_error *err)
+{
+    (void)in;
+    out->data = rl_arena_array(arena, RL_LTC_FLOATS, sizeof *out->data);
+    if (!out->data)
+        return rl_fail_memory(err, sizeof rl_ltc_table);
+    memcpy(out->data, rl_ltc_table, sizeof rl_ltc_table);
+    out->n = RL_LTC_FLOATS;
+    return RL_OK;
+}
+
 static const rl_step steps[] = {
     {"lighting", .domain = RL_EVERY_VECTOR},
     {"lighting_energy", .domain = RL_EVERY_BAND, .with = "energy"},
@@ -109,10 +126,12 @@ static bool stochastic(const void *values, bool march)
 
 const rl_pass rl_pass_lighting = {
     .name = "lighting",
-    .help = "direct and ambient light: diffuse transmission, specular reflection, translucency",
-    .source = "Golubev 2018; Helix; Walter 2007; Heitz 2014",
+    .help = "direct, area and ambient light: diffuse transmission, specular reflection, translucency",
+    .source = "Golubev 2018; Helix; Walter 2007; Heitz 2014; Heitz et al. 2016",
     .kernel = "lighting.cl",
-    .kernel_prelude = "energy.cl sg.cl surface.cl sg_shade.cl screen_shadow.cl",
+    .kernel_prelude =
+        "energy.cl sg.cl surface.cl sg_shade.cl slab.cl screen_shadow.cl ltc.cl area.cl profile.cl "
+        "sky.cl",
     .params = RL_ARRAY(params),
     .params_size = sizeof(lighting_params),
     .profile_keys = RL_ARRAY(profile_keys),
@@ -122,6 +141,8 @@ const rl_pass rl_pass_lighting = {
     .steps = RL_ARRAY(steps),
     .lights = true,
     .ambient = true,
+    .light_tables = true,
+    .tables = lighting_tables,
     .stochastic = stochastic,
     .cost = cost,
 };

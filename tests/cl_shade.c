@@ -65,11 +65,14 @@ static void add_prelude(rl_str *s, const shade_run *run)
     }
     for (size_t r = 0; r < pass->params.n; r++)
         add_param(s, &pass->params.rows[r], params_of(run));
-    int march = 0;
-    for (int i = 0; i < run->frame.lights && pass->lights; i++)
+    int march = 0, area = 0;
+    for (int i = 0; i < run->frame.lights && pass->lights; i++) {
         march |= run->lights[i].shadow == SHADOW_MARCH;
-    if (pass->lights)
-        rl_str_printf(s, "#define LIGHTS_MARCH %d\n", march);
+        area |= run->lights[i].type >= LIGHT_SPHERE;
+    }
+    rl_str_printf(s, "#define LIGHTS_MARCH %d\n#define LIGHTS_AREA %d\n", march, area);
+    rl_str_printf(s, "#define LIGHTS_PROFILE %d\n#define LIGHTS_SKY %d\n", run->profiles != NULL,
+                  run->sky != NULL);
     rl_str_add(s, "typedef struct material_t { int has_profile; ");
     shade_each_row(run->materials, add_row, s);
     rl_str_add(s, "} material_t;\n");
@@ -154,7 +157,7 @@ static cl_program build(const char *text, int lanes)
 typedef struct launch {
     cl_program program;
     cl_kernel kernel;
-    cl_mem buffers[SHADE_PORTS + 6]; /* NULL for absent ports */
+    cl_mem buffers[SHADE_PORTS + 9]; /* NULL for absent ports */
     cl_uint n;
 } launch;
 
@@ -224,6 +227,18 @@ static bool add_materials(launch *l, const shade_materials *m)
     return add_buffer(l, packed, (m->n ? m->n : 1) * words * 4);
 }
 
+/* Of passes whose tables depend on nothing. */
+static bool add_tables(launch *l, const rl_pass *pass)
+{
+    rl_arena arena = {0};
+    rl_tables tables = {0};
+    rl_pass_input in = {.pass = pass};
+    bool ok = pass->tables(&in, &arena, &tables, NULL) == RL_OK &&
+              add_buffer(l, tables.data, tables.n * sizeof *tables.data);
+    rl_arena_free(&arena);
+    return ok;
+}
+
 static bool add_arguments(launch *l, const shade_run *run)
 {
     const rl_pass *pass = run->pass;
@@ -239,7 +254,12 @@ static bool add_arguments(launch *l, const shade_run *run)
     const ambient_t dark = {0};
     if (pass->lights && !add_buffer(l, run->frame.lights ? run->lights : &none, n * sizeof(light_t)))
         return false;
-    return !pass->ambient || add_buffer(l, run->ambient ? run->ambient : &dark, sizeof dark);
+    if (pass->ambient && !add_buffer(l, run->ambient ? run->ambient : &dark, sizeof dark))
+        return false;
+    if (pass->light_tables && (!add_buffer(l, run->profiles, run->n_profiles * sizeof *run->profiles) ||
+                               !add_buffer(l, run->sky, run->n_sky * sizeof *run->sky)))
+        return false;
+    return !pass->tables || add_tables(l, pass);
 }
 
 static int lanes_of(const shade_run *run)

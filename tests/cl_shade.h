@@ -30,11 +30,13 @@ typedef struct shade_run {
     const shade_image *images[SHADE_PORTS]; /* in port order; NULL = absent */
     bool phase4[SHADE_PORTS];               /* any_layout outputs: ask the kernel for RL_PHASE4 */
     const shade_materials *materials;
-    const light_t *lights;    /* frame.lights of them */
-    const ambient_t *ambient; /* NULL = none */
-    int lanes;                /* RL_W; 0 = 16 */
-    int repeat;               /* for timings: runs beyond the first */
-    double best_ms;           /* out: the fastest run */
+    const light_t *lights;       /* frame.lights of them */
+    const ambient_t *ambient;    /* NULL = none */
+    const float *profiles, *sky; /* the tables of the lights (kernels/shared.h); NULL = none */
+    size_t n_profiles, n_sky;    /* floats */
+    int lanes;                   /* RL_W; 0 = 16 */
+    int repeat;                  /* for timings: runs beyond the first */
+    double best_ms;              /* out: the fastest run */
 } shade_run;
 
 /* A frame of w x h pixels whose data window starts at (x0, y0) in display pixels; camera all zero. */

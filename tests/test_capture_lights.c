@@ -104,6 +104,21 @@ static void test_photometric(void **state)
         truth(SCENE_KEY, SCENE_KEY));
 }
 
+/* Above the horizon a sphere lights as a point does; its sizes are in the capture's unit, its place in either
+ * space. */
+static void test_sphere(void **state)
+{
+    (void)state;
+    expect_lights("lights:\n"
+                  "  key: {type: sphere, position: [0.6, 1.2, -0.4], radius: 0.0005, intensity: [3, 2, 1], "
+                  "shadow: none}\n",
+                  truth(SCENE_KEY, 0));
+    expect_lights("lights:\n"
+                  "  key: {type: sphere, position: [0.6, 1.2, -0.4], radius: 0.0005, shadow: none,\n"
+                  "        power: [37.69911184, 25.13274123, 12.56637061]}\n",
+                  truth(SCENE_KEY, 0));
+}
+
 /* ---- shadows ---- */
 
 #define KEY "type: point, position: [0.6, 1.2, -0.4], intensity: [3, 2, 1]"
@@ -364,11 +379,17 @@ static void test_memory_without_name(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_photometric),    cmocka_unit_test(test_shadows),
-        cmocka_unit_test(test_no_such_shadow), cmocka_unit_test(test_renamed_layers),
-        cmocka_unit_test(test_camera_space),   cmocka_unit_test(test_working_space),
-        cmocka_unit_test(test_bare),           cmocka_unit_test(test_preset_inline),
-        cmocka_unit_test(test_preset_blender), cmocka_unit_test(test_memory_without_name),
+        cmocka_unit_test(test_photometric),
+        cmocka_unit_test(test_sphere),
+        cmocka_unit_test(test_shadows),
+        cmocka_unit_test(test_no_such_shadow),
+        cmocka_unit_test(test_renamed_layers),
+        cmocka_unit_test(test_camera_space),
+        cmocka_unit_test(test_working_space),
+        cmocka_unit_test(test_bare),
+        cmocka_unit_test(test_preset_inline),
+        cmocka_unit_test(test_preset_blender),
+        cmocka_unit_test(test_memory_without_name),
     };
     return cmocka_run_group_tests(tests, setup, teardown);
 }

@@ -527,16 +527,36 @@ static void test_lights(void **state)
     assert_true(fabs(i[0] - 2) < 1e-12 && m->lights.light[1].shadow == RL_SHADOW_SCREEN);
 }
 
+/* What area lights have comes back as it was, in the capture's unit. */
+static void test_print_shapes(void **state)
+{
+    (void)state;
+    rl_manifest *m =
+        parse(with("files: a.exr\nunit: cm\n%slights: {"
+                   "a: {type: sphere, position: [0, 0, 1], radius: 3, radiance: 2}, b: {type: rect, "
+                   "position: [0, 0, 1], direction: [0, 1, 0], width: 4, height: 5, two_sided: true, "
+                   "lumen: 7}}\n",
+                   layers));
+    rl_str text = {0};
+    rl_manifest_print(m, &text);
+    assert_non_null(
+        strstr(text.text, "a: {type: sphere, position: [0, 0, 1], radius: 3, radiance: [2, 2, 2]}"));
+    assert_non_null(strstr(text.text,
+                           "b: {type: rect, position: [0, 0, 1], direction: [0, 1, 0], width: 4, height: 5, "
+                           "up: [0, 0, 1], two_sided: true, lumen: [7, 7, 7]}"));
+    rl_str_free(&text);
+}
+
 static void test_bad_lights(void **state)
 {
     (void)state;
     static const char *const rows[][2] = {
-        {"{position: [0, 0, 0]}", "light 'k' needs 'type': point, spot or directional"},
-        {"{type: sphere}", "'type' cannot be 'sphere'; known: directional, point, spot"},
+        {"{position: [0, 0, 0]}", "light 'k' needs 'type': point, spot, directional, sphere or rect"},
+        {"{type: disk}", "'type' cannot be 'disk'; known: directional, point, rect, sphere, spot"},
         {"{type: point, intensity: 1}", "light 'k': a point light needs 'position'"},
-        {"{type: point, position: [0, 0, 0]}", "light 'k' needs intensity, candela or lumen"},
+        {"{type: point, position: [0, 0, 0]}", "light 'k' needs intensity, power, candela or lumen"},
         {"{type: point, position: [0, 0, 0], lux: 3}",
-         "light 'k': a point light takes intensity, candela or lumen, not lux"},
+         "light 'k': a point light takes intensity, power, candela or lumen, not lux"},
         {"{type: point, position: [0, 0, 0], lumen: 3, candela: 2}",
          "light 'k' has both candela and lumen; give one"},
         {"{type: point, position: [0, 0, 0], intensity: -1}", "'intensity' is -1: out of range, at least 0"},
@@ -547,7 +567,7 @@ static void test_bad_lights(void **state)
         {"{type: point, position: [0, 0, 0], intensity: 1, angle: 3}",
          "light 'k': a point light has no 'angle'"},
         {"{type: point, position: [0, 0, 0], intensity: 1, direction: [0, 0, 1]}",
-         "light 'k': a point light has no 'direction'"},
+         "light 'k': a point light has no 'direction' without 'ies'"},
         {"{type: directional, direction: [0, 0, 0], lux: 1}",
          "light 'k': the direction has no usable length"},
         {"{type: spot, position: [0, 0, 0], direction: [0, 0, 1], intensity: 1}",
@@ -557,8 +577,9 @@ static void test_bad_lights(void **state)
         {"{type: point, positon: [0, 0, 0]}",
          "light 'k' has no key 'positon'; did you mean 'position'? "
          "known: angle, blend, candela, color, colorspace, "
-         "direction, efficacy, enabled, exposure, intensity, "
-         "irradiance, lumen, lux, position, shadow, space, temperature, tint, type"},
+         "direction, efficacy, enabled, exposure, height, ies, intensity, "
+         "irradiance, lumen, luminance, lux, position, power, radiance, radius, shadow, space, "
+         "temperature, tint, two_sided, type, up, width"},
         {"bright", "light 'k': expected a map, found the text 'bright'"},
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
@@ -742,11 +763,10 @@ int main(void)
 #define T(f) cmocka_unit_test_setup_teardown(f, reset, reset)
 #define F(f) cmocka_unit_test_setup_teardown(f, make_folder, drop_folder)
     const struct CMUnitTest tests[] = {
-        T(test_whole),     T(test_print_reads_back), T(test_defaults_are_noted),
-        T(test_bad),       T(test_bad_layers),       T(test_depth),
-        T(test_camera),    F(test_found_frames),     T(test_names_from_files),
-        T(test_lights),    T(test_bad_lights),       T(test_preset_binds),
-        T(test_bare_file), T(test_damage),           T(test_failing_memory),
+        T(test_whole),        T(test_print_reads_back), T(test_print_shapes), T(test_defaults_are_noted),
+        T(test_bad),          T(test_bad_layers),       T(test_depth),        T(test_camera),
+        F(test_found_frames), T(test_names_from_files), T(test_lights),       T(test_bad_lights),
+        T(test_preset_binds), T(test_bare_file),        T(test_damage),       T(test_failing_memory),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -82,7 +82,7 @@ static rl_program *form_build(const form *f, const char *what)
     rl_error err = {0};
     rl_program *program = NULL;
     rl_plan_node node = {.node = 0, .buffers = f->buffers};
-    rl_code code = rl_kernel_text(&arena, &f->plan, &node, true, &text, &err);
+    rl_code code = rl_kernel_text(&arena, &f->plan, &node, RL_LIGHTS_ALL, &text, &err);
     char *own = code ? NULL : own_materials(f->pass, rl_str_text(&text));
     if (code || rl_program_build(device, f->pass->name, own, true, &program, &err))
         fail_msg("%s (%s): %s:%d:%d: %s", f->pass->name, what, err.file, err.line, err.column, err.text);
@@ -203,8 +203,8 @@ static rl_memory *image_memory(rl_format format)
     return m;
 }
 
-/* As the executor orders them (graph/model/pass.h): ports, params, frame, materials, lights, ambient, tables.
- */
+/* As the executor orders them (graph/model/pass.h): ports, params, frame, materials, lights, ambient, two
+ * tables of the lights, tables. */
 static size_t make_arguments(const form *f, rl_memory **args)
 {
     const rl_pass *p = f->pass;
@@ -219,7 +219,8 @@ static size_t make_arguments(const form *f, rl_memory **args)
     for (size_t i = 0; i < p->ports.n; i++)
         if (f->buffers[i] >= 0 || !rl_port_on_request(&p->ports.rows[i]))
             args[n++] = f->buffers[i] < 0 ? NULL : image_memory(p->ports.rows[i].format);
-    size_t extra = (p->params.n > 0) + 2u + p->lights + p->ambient + (p->tables != NULL);
+    size_t extra =
+        (p->params.n > 0) + 2u + p->lights + p->ambient + 2u * p->light_tables + (p->tables != NULL);
     for (size_t i = 0; i < extra; i++)
         assert_int_equal(rl_memory_new(device, 1 << 18, 0, &args[n + i], &err), RL_OK);
     if (p->params.n > 0)
@@ -239,7 +240,7 @@ static bool feeds(const form *f, const char *port)
 
 static void run_form(const form *f, const char *what)
 {
-    rl_memory *args[MOST_PORTS + 5] = {0};
+    rl_memory *args[MOST_PORTS + 7] = {0};
     rl_program *program = form_build(f, what);
     size_t n = make_arguments(f, args);
     rl_error err = {0};

@@ -66,14 +66,16 @@ static rl_code read_lobes(const rl_value *v, rl_ambient *a, rl_error *err)
 static rl_code read_hdri(rl_arena *arena, const rl_value *v, rl_ambient *a, rl_error *err)
 {
     const rl_value *hdri = rl_value_get(v, "hdri"), *up = rl_value_get(v, "up"),
-                   *turn = rl_value_get(v, "rotation");
-    const rl_value *stray = up ? up : turn;
+                   *turn = rl_value_get(v, "rotation"), *specular = rl_value_get(v, "specular");
+    const rl_value *stray = up ? up : turn ? turn : specular;
     const char *text;
     int axis = 0;
     double degrees = 0;
     if (!hdri)
         return stray ? rl_fail(err, RL_E_CONFIG, stray->where, "'%s' is of an hdri, and there is none",
-                               up ? "up" : "rotation")
+                               up     ? "up"
+                               : turn ? "rotation"
+                                      : "specular")
                      : RL_OK;
     a->hdri_where = hdri->where;
     if (!up)
@@ -84,6 +86,8 @@ static rl_code read_hdri(rl_arena *arena, const rl_value *v, rl_ambient *a, rl_e
         code = rl_value_word(up, "up", "y|z", &axis, err);
     if (!code && turn)
         code = rl_value_number(turn, "rotation", -36000, 36000, &degrees, err);
+    if (!code && specular)
+        code = rl_value_truth(specular, "specular", &a->specular, err);
     if (!code && !(a->hdri = rl_value_path(arena, hdri)))
         code = rl_fail_memory(err, 0);
     a->z_up = axis == 1;
@@ -93,9 +97,11 @@ static rl_code read_hdri(rl_arena *arena, const rl_value *v, rl_ambient *a, rl_e
 
 rl_code rl_ambient_parse(rl_arena *arena, const rl_value *v, rl_ambient *out, rl_error *err)
 {
-    static const char *const keys[] = {"sh", "lobes", "hdri", "up", "rotation", "intensity", "colorspace"};
+    static const char *const keys[] = {"sh",       "lobes",    "hdri",      "up",
+                                       "rotation", "specular", "intensity", "colorspace"};
     const rl_value *x;
-    *out = (rl_ambient){.intensity = {1, 1, 1}, .colorspace = "lin_rec709", .colorspace_where = v->where};
+    *out = (rl_ambient){
+        .intensity = {1, 1, 1}, .specular = true, .colorspace = "lin_rec709", .colorspace_where = v->where};
     rl_code code = rl_value_keys(v, "ambient", keys, sizeof keys / sizeof *keys, err);
     if (!code && (x = rl_value_get(v, "sh")))
         code = read_sh(x, out, err);
@@ -139,6 +145,14 @@ void rl_ambient_direction(const rl_ambient *a, double u, double v, double out[3]
     out[0] = a->z_up ? front : left;
     out[1] = a->z_up ? left : up;
     out[2] = a->z_up ? up : front;
+}
+
+void rl_ambient_place(const rl_ambient *a, const double d[3], double *u, double *v)
+{
+    double front = d[a->z_up ? 0 : 2], left = d[a->z_up ? 1 : 0], up = d[a->z_up ? 2 : 1];
+    double turns = (a->rotation - atan2(left, front)) / (2 * pi) + 0.5;
+    *u = turns - floor(turns);
+    *v = 0.5 - asin(fmin(fmax(up, -1), 1)) / pi;
 }
 
 unsigned long long rl_ambient_project(const rl_ambient *a, const float *const plane[3], int width, int height,

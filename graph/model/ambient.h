@@ -7,6 +7,7 @@
  * e^(sharpness (axis.v - 1)); at most 16 hdri: studio.exr          latitude-longitude, linear; relative to
  * the file that names it up: y                     hdri: the world axis that its upper edge shows, y or z
  *       rotation: 90              hdri: degrees around `up`, counter-clockwise from above
+ *       specular: true            hdri: whether surfaces mirror it; the other parts are diffuse light alone
  *       intensity: 0.5            of all parts; one number or three
  *       colorspace: lin_rec709    of all parts; the default
  *
@@ -40,6 +41,7 @@ typedef struct rl_ambient {
     rl_where hdri_where;
     bool z_up;
     double rotation; /* radians */
+    bool specular;   /* default true */
     double intensity[3];
     const char *colorspace;
     rl_where colorspace_where;
@@ -53,6 +55,9 @@ void rl_ambient_basis(const double direction[3], double out[RL_AMBIENT_BANDS]);
 
 /* The direction that a latitude-longitude image shows at (u, v), 0…1 from its left upper corner. */
 void rl_ambient_direction(const rl_ambient *a, double u, double v, double out[3]);
+
+/* Where it shows a unit direction: the inverse. */
+void rl_ambient_place(const rl_ambient *a, const double direction[3], double *u, double *v);
 
 /* Adds the projection of a latitude-longitude image (planes of width * height, linear) to sh, before
  * intensity: exact solid angles, harmonics at the pixels' centres, so that an even sky of h rows has an error

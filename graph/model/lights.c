@@ -9,19 +9,28 @@
 
 static const double pi = 3.14159265358979323846;
 
-static const char *const unit_keys[] = {"intensity", "irradiance", "candela", "lumen", "lux"};
-#define POINT_UNITS (1u << RL_LIGHT_INTENSITY | 1u << RL_LIGHT_CANDELA | 1u << RL_LIGHT_LUMEN)
-#define SUN_UNITS   (1u << RL_LIGHT_IRRADIANCE | 1u << RL_LIGHT_LUX)
+const char *const rl_light_unit_names[] = {"intensity", "irradiance", "radiance", "power",
+                                           "candela",   "lumen",      "lux",      "luminance"};
+const char *const rl_light_type_names[] = {"point", "spot", "directional", "sphere", "rect"};
+
+#define BIT(unit) (1u << (unit))
+#define POINT_UNITS                                                                                          \
+    (BIT(RL_LIGHT_INTENSITY) | BIT(RL_LIGHT_POWER) | BIT(RL_LIGHT_CANDELA) | BIT(RL_LIGHT_LUMEN))
+#define AREA_UNITS  (POINT_UNITS | BIT(RL_LIGHT_RADIANCE) | BIT(RL_LIGHT_LUMINANCE))
+#define SUN_UNITS   (BIT(RL_LIGHT_IRRADIANCE) | BIT(RL_LIGHT_LUX))
+#define POINT_WORDS "intensity, power, candela or lumen"
+#define AREA_WORDS  "radiance, intensity, power, luminance, candela or lumen"
 
 static const struct {
-    const char *name;
-    bool positioned, directed;
+    bool positioned, directed, shaped; /* shaped: may have ies */
     unsigned units;
     const char *wanted;
 } types[] = {
-    {"point", true, false, POINT_UNITS, "intensity, candela or lumen"},
-    {"spot", true, true, POINT_UNITS, "intensity, candela or lumen"},
-    {"directional", false, true, SUN_UNITS, "irradiance or lux"},
+    [RL_LIGHT_POINT] = {true, false, true, POINT_UNITS, POINT_WORDS},
+    [RL_LIGHT_SPOT] = {true, true, true, POINT_UNITS, POINT_WORDS},
+    [RL_LIGHT_DIRECTIONAL] = {false, true, false, SUN_UNITS, "irradiance or lux"},
+    [RL_LIGHT_SPHERE] = {true, false, false, AREA_UNITS, AREA_WORDS},
+    [RL_LIGHT_RECT] = {true, true, false, AREA_UNITS, AREA_WORDS},
 };
 
 /* One number, or three. */
@@ -39,22 +48,25 @@ static rl_code read_rgb(const rl_value *v, const char *name, double out[3], rl_e
 static rl_code read_amount(const rl_value *v, rl_light_spec *l, rl_error *err)
 {
     const rl_value *given = NULL;
-    for (int u = 0; u <= RL_LIGHT_LUX; u++) {
-        const rl_value *amount = rl_value_get(v, unit_keys[u]);
+    for (int u = 0; u <= RL_LIGHT_LUMINANCE; u++) {
+        const rl_value *amount = rl_value_get(v, rl_light_unit_names[u]);
         if (!amount)
             continue;
         if (!(types[l->type].units & 1u << u))
             return rl_fail(err, RL_E_CONFIG, amount->where, "light '%s': a %s light takes %s, not %s",
-                           l->name, types[l->type].name, types[l->type].wanted, unit_keys[u]);
+                           l->name, rl_light_type_names[l->type], types[l->type].wanted,
+                           rl_light_unit_names[u]);
         if (given)
             return rl_fail(err, RL_E_CONFIG, amount->where, "light '%s' has both %s and %s; give one",
-                           l->name, unit_keys[l->unit], unit_keys[u]);
+                           l->name, rl_light_unit_names[l->unit], rl_light_unit_names[u]);
         given = amount;
         l->unit = (rl_light_unit)u;
     }
-    if (!given)
+    if (!given && !l->ies)
         return rl_fail(err, RL_E_CONFIG, v->where, "light '%s' needs %s", l->name, types[l->type].wanted);
-    rl_code code = read_rgb(given, unit_keys[l->unit], l->amount, err);
+    l->has_amount = given != NULL;
+    l->amount[0] = l->amount[1] = l->amount[2] = 1;
+    rl_code code = given ? read_rgb(given, rl_light_unit_names[l->unit], l->amount, err) : RL_OK;
     const rl_value *color = rl_value_get(v, "color");
     double tint[3] = {1, 1, 1};
     if (!code && color)
@@ -82,6 +94,33 @@ static rl_code read_temperature(const rl_value *v, rl_light_spec *l, rl_error *e
     return code;
 }
 
+/* Three numbers as a unit vector. */
+static rl_code read_direction(const rl_value *v, const char *key, const rl_light_spec *l, double out[3],
+                              rl_error *err)
+{
+    rl_code code = rl_value_numbers(v, key, 3, out, err);
+    double length = hypot(hypot(out[0], out[1]), out[2]);
+    if (!code && !(length > 1e-12 && length < 1e150))
+        return rl_fail(err, RL_E_CONFIG, v->where, "light '%s': the %s has no usable length", l->name, key);
+    for (int i = 0; i < 3 && !code; i++)
+        out[i] /= length;
+    return code;
+}
+
+/* Of lights that look different from around their direction. */
+static rl_code read_up(const rl_value *v, rl_light_spec *l, rl_error *err)
+{
+    const rl_value *up = rl_value_get(v, "up");
+    const double *d = l->direction;
+    rl_code code = up ? read_direction(up, "up", l, l->up, err) : RL_OK;
+    if (!up)
+        l->up[fabs(d[1]) > 0.99 ? 2 : 1] = 1;
+    double along = l->up[0] * d[0] + l->up[1] * d[1] + l->up[2] * d[2];
+    if (!code && fabs(along) > 1 - 1e-6)
+        code = rl_fail(err, RL_E_CONFIG, up->where, "light '%s': 'up' lies along the direction", l->name);
+    return code;
+}
+
 static rl_code read_placement(const rl_value *v, double metres, rl_light_spec *l, rl_error *err)
 {
     const rl_value *position = rl_value_get(v, "position"), *direction = rl_value_get(v, "direction");
@@ -90,21 +129,59 @@ static rl_code read_placement(const rl_value *v, double metres, rl_light_spec *l
                                                                   : NULL;
     if (missing)
         return rl_fail(err, RL_E_CONFIG, v->where, "light '%s': a %s light needs '%s'", l->name,
-                       types[l->type].name, missing);
+                       rl_light_type_names[l->type], missing);
+    if (rl_value_get(v, "ies") && !direction)
+        return rl_fail(
+            err, RL_E_CONFIG, v->where,
+            "light '%s': with 'ies' it needs 'direction', where the file's vertical angle 0 points", l->name);
     rl_code code = position ? rl_value_numbers(position, "position", 3, l->position_m, err) : RL_OK;
     if (!code && direction)
-        code = rl_value_numbers(direction, "direction", 3, l->direction, err);
-    if (code)
-        return code;
-    double length = hypot(hypot(l->direction[0], l->direction[1]), l->direction[2]);
-    if (direction && !(length > 1e-12 && length < 1e150))
-        return rl_fail(err, RL_E_CONFIG, direction->where, "light '%s': the direction has no usable length",
-                       l->name);
-    for (int i = 0; i < 3; i++) {
+        code = read_direction(direction, "direction", l, l->direction, err);
+    if (!code && (l->type == RL_LIGHT_RECT || rl_value_get(v, "ies")))
+        code = read_up(v, l, err);
+    for (int i = 0; i < 3; i++)
         l->position_m[i] *= metres;
-        l->direction[i] /= direction ? length : 1;
-    }
-    return RL_OK;
+    return code;
+}
+
+static rl_code read_length(const rl_value *v, const char *key, double metres, const rl_light_spec *l,
+                           double *out, rl_error *err)
+{
+    const rl_value *x = rl_value_get(v, key);
+    if (!x)
+        return rl_fail(err, RL_E_CONFIG, v->where, "light '%s': a %s light needs '%s'", l->name,
+                       rl_light_type_names[l->type], key);
+    rl_code code = rl_value_number(x, key, 0, 1e12, out, err);
+    *out *= metres;
+    if (!code && !(*out >= 1e-9))
+        code =
+            rl_fail(err, RL_E_CONFIG, x->where,
+                    "light '%s': the %s is below a nanometre; a light without size is a point", l->name, key);
+    return code;
+}
+
+static rl_code read_area(const rl_value *v, double metres, rl_light_spec *l, rl_error *err)
+{
+    const rl_value *two_sided = rl_value_get(v, "two_sided");
+    if (l->type == RL_LIGHT_SPHERE)
+        return read_length(v, "radius", metres, l, &l->radius_m, err);
+    rl_code code = read_length(v, "width", metres, l, &l->width_m, err);
+    if (!code)
+        code = read_length(v, "height", metres, l, &l->height_m, err);
+    if (!code && two_sided)
+        code = rl_value_truth(two_sided, "two_sided", &l->two_sided, err);
+    return code;
+}
+
+static rl_code read_ies(rl_arena *arena, const rl_value *v, rl_light_spec *l, rl_error *err)
+{
+    const rl_value *ies = rl_value_get(v, "ies");
+    const char *text;
+    rl_code code = ies ? rl_value_text(ies, "ies", &text, err) : RL_OK;
+    if (!ies || code)
+        return code;
+    l->ies = rl_value_path(arena, ies);
+    return l->ies ? rl_ies_load(arena, l->ies, &l->profile, err) : rl_fail_memory(err, 0);
 }
 
 static rl_code read_spot(const rl_value *v, rl_light_spec *l, rl_error *err)
@@ -162,30 +239,42 @@ static rl_code read_common(const rl_value *v, rl_light_spec *l, rl_error *err)
 /* A key that the light's type cannot use is a mistake, not decoration. */
 static rl_code check_keys(const rl_value *v, const rl_light_spec *l, rl_error *err)
 {
+    bool shaped = types[l->type].shaped && rl_value_get(v, "ies"), rect = l->type == RL_LIGHT_RECT;
     const struct {
         const char *key;
         bool used;
     } keys[] = {
         {"position", types[l->type].positioned},
-        {"direction", types[l->type].directed},
+        {"direction", types[l->type].directed || shaped},
         {"angle", l->type == RL_LIGHT_SPOT},
         {"blend", l->type == RL_LIGHT_SPOT},
+        {"radius", l->type == RL_LIGHT_SPHERE},
+        {"width", rect},
+        {"height", rect},
+        {"two_sided", rect},
+        {"up", rect || shaped},
+        {"ies", types[l->type].shaped},
     };
     for (size_t i = 0; i < sizeof keys / sizeof *keys; i++) {
         const rl_value *x = rl_value_get(v, keys[i].key);
         if (x && !keys[i].used)
-            return rl_fail(err, RL_E_CONFIG, x->where, "light '%s': a %s light has no '%s'", l->name,
-                           types[l->type].name, keys[i].key);
+            return rl_fail(err, RL_E_CONFIG, x->where, "light '%s': a %s light has no '%s'%s", l->name,
+                           rl_light_type_names[l->type], keys[i].key,
+                           types[l->type].shaped &&
+                                   (!strcmp(keys[i].key, "up") || !strcmp(keys[i].key, "direction"))
+                               ? " without 'ies'"
+                               : "");
     }
     return RL_OK;
 }
 
-static rl_code read_light(const rl_entry *e, double metres, rl_light_spec *l, rl_error *err)
+static rl_code read_type(const rl_entry *e, rl_light_spec *l, rl_error *err)
 {
-    static const char *const known[] = {"type",      "position",   "direction",   "angle",    "blend",
-                                        "intensity", "irradiance", "candela",     "lumen",    "lux",
-                                        "color",     "colorspace", "efficacy",    "exposure", "enabled",
-                                        "space",     "shadow",     "temperature", "tint"};
+    static const char *const known[] = {
+        "type",     "position", "direction", "up",    "angle",     "blend",       "radius",
+        "width",    "height",   "two_sided", "ies",   "intensity", "power",       "irradiance",
+        "radiance", "candela",  "lumen",     "lux",   "luminance", "color",       "colorspace",
+        "efficacy", "exposure", "enabled",   "space", "shadow",    "temperature", "tint"};
     const rl_value *v = e->value, *type = rl_value_get(v, "type");
     int t = 0;
     rl_str what = {0};
@@ -196,21 +285,31 @@ static rl_code read_light(const rl_entry *e, double metres, rl_light_spec *l, rl
     if (code)
         return code;
     if (!type)
-        return rl_fail(err, RL_E_CONFIG, v->where, "light '%s' needs 'type': point, spot or directional",
-                       e->key);
-    code = rl_value_word(type, "type", "point|spot|directional", &t, err);
-    if (code)
-        return code;
+        return rl_fail(err, RL_E_CONFIG, v->where,
+                       "light '%s' needs 'type': point, spot, directional, sphere or rect", e->key);
+    code = rl_value_word(type, "type", "point|spot|directional|sphere|rect", &t, err);
     l->name = e->key;
     l->where = e->where;
     l->type = (rl_light_type)t;
-    code = check_keys(v, l, err);
+    return code;
+}
+
+static rl_code read_light(rl_arena *arena, const rl_entry *e, double metres, rl_light_spec *l, rl_error *err)
+{
+    const rl_value *v = e->value;
+    rl_code code = read_type(e, l, err);
+    if (!code)
+        code = check_keys(v, l, err);
     if (!code)
         code = read_common(v, l, err);
     if (!code)
         code = read_placement(v, metres, l, err);
     if (!code && l->type == RL_LIGHT_SPOT)
         code = read_spot(v, l, err);
+    if (!code && (l->type == RL_LIGHT_SPHERE || l->type == RL_LIGHT_RECT))
+        code = read_area(v, metres, l, err);
+    if (!code)
+        code = read_ies(arena, v, l, err);
     if (!code)
         code = read_amount(v, l, err);
     if (!code)
@@ -228,23 +327,56 @@ rl_code rl_lights_parse(rl_arena *arena, const rl_value *v, double metres, rl_li
         return rl_fail_memory(err, v->n * sizeof *out->light);
     rl_code code = RL_OK;
     for (size_t i = 0; i < v->n && !code; i++)
-        code = read_light(&v->entries[i], metres, &out->light[i], err);
+        code = read_light(arena, &v->entries[i], metres, &out->light[i], err);
     out->n = code ? 0 : v->n;
     return code;
+}
+
+double rl_light_area(const rl_light_spec *spec)
+{
+    return spec->type == RL_LIGHT_SPHERE ? pi * spec->radius_m * spec->radius_m
+                                         : spec->width_m * spec->height_m;
+}
+
+/* Directions that a light of an intensity of 1 would have to fill evenly for its flux. */
+static double solid_angle(const rl_light_spec *spec)
+{
+    double s = sin(spec->angle / 4);
+    if (spec->profile)
+        return rl_ies_integral(spec->profile, spec->type == RL_LIGHT_SPOT ? spec->angle / 2 : pi);
+    if (spec->type == RL_LIGHT_RECT)
+        return spec->two_sided ? 2 * pi : pi;
+    /* 1 - cos(a/2) = 2 sin²(a/4), which does not cancel for narrow cones */
+    return spec->type == RL_LIGHT_SPOT ? 4 * pi * s * s : 4 * pi;
 }
 
 void rl_light_resolve(const rl_light_spec *spec, double out[3])
 {
     double scale = exp2(spec->exposure);
-    if (spec->unit == RL_LIGHT_CANDELA || spec->unit == RL_LIGHT_LUX)
+    if (!spec->has_amount)
+        scale *= spec->profile->candela / spec->efficacy;
+    else if (spec->unit >= RL_LIGHT_CANDELA)
         scale /= spec->efficacy;
-    if (spec->unit == RL_LIGHT_LUMEN) {
-        /* 1 - cos(a/2) = 2 sin²(a/4), which does not cancel for narrow cones */
-        double s = sin(spec->angle / 4), omega = spec->type == RL_LIGHT_SPOT ? 4 * pi * s * s : 4 * pi;
-        scale /= omega * spec->efficacy;
-    }
+    if (spec->unit == RL_LIGHT_POWER || spec->unit == RL_LIGHT_LUMEN)
+        scale /= solid_angle(spec);
+    if (spec->unit == RL_LIGHT_RADIANCE || spec->unit == RL_LIGHT_LUMINANCE)
+        scale *= rl_light_area(spec);
     for (int c = 0; c < 3; c++)
         out[c] = spec->amount[c] * scale;
+}
+
+void rl_light_axes(const rl_light_spec *spec, double side[3], double top[3])
+{
+    const double *d = spec->direction, *up = spec->up;
+    double along = up[0] * d[0] + up[1] * d[1] + up[2] * d[2], length = 0;
+    for (int i = 0; i < 3; i++) {
+        top[i] = up[i] - along * d[i];
+        length += top[i] * top[i];
+    }
+    for (int i = 0; i < 3; i++)
+        top[i] /= sqrt(length);
+    for (int i = 0; i < 3; i++)
+        side[i] = top[(i + 1) % 3] * d[(i + 2) % 3] - top[(i + 2) % 3] * d[(i + 1) % 3];
 }
 
 void rl_light_cone(const rl_light_spec *spec, double *cos_inner, double *cos_outer)

@@ -165,30 +165,55 @@ static void print_layers(const rl_manifest *m, rl_str *s)
     }
 }
 
+/* What area lights and lights with ies have besides. */
+static void print_shape(const rl_light_spec *l, double unit, rl_str *s)
+{
+    const struct {
+        const char *key;
+        double metres;
+    } lengths[] = {{"radius", l->radius_m}, {"width", l->width_m}, {"height", l->height_m}};
+    for (size_t i = 0; i < sizeof lengths / sizeof *lengths; i++)
+        if (lengths[i].metres > 0) {
+            rl_str_printf(s, ", %s: ", lengths[i].key);
+            print_number(s, lengths[i].metres / unit);
+        }
+    if (l->type == RL_LIGHT_RECT || l->ies) {
+        rl_str_add(s, ", up: ");
+        print_numbers(s, l->up, 3);
+    }
+    if (l->two_sided)
+        rl_str_add(s, ", two_sided: true");
+    if (l->ies) {
+        rl_str_add(s, ", ies: ");
+        print_text(s, l->ies);
+    }
+}
+
 static void print_light(const rl_light_spec *l, double unit, rl_str *s)
 {
-    static const char *const types[] = {"point", "spot", "directional"};
-    static const char *const units[] = {"intensity", "irradiance", "candela", "lumen", "lux"};
     double position[3] = {l->position_m[0] / unit, l->position_m[1] / unit, l->position_m[2] / unit};
     rl_str_add(s, "  ");
     print_text(s, l->name);
-    rl_str_printf(s, ": {type: %s", types[l->type]);
+    rl_str_printf(s, ": {type: %s", rl_light_type_names[l->type]);
     if (l->type != RL_LIGHT_DIRECTIONAL) {
         rl_str_add(s, ", position: ");
         print_numbers(s, position, 3);
     }
-    if (l->type != RL_LIGHT_POINT) {
+    if (l->direction[0] != 0 || l->direction[1] != 0 || l->direction[2] != 0) {
         rl_str_add(s, ", direction: ");
         print_numbers(s, l->direction, 3);
     }
+    print_shape(l, unit, s);
     if (l->type == RL_LIGHT_SPOT) {
         rl_str_add(s, ", angle: ");
         print_number(s, l->angle * 180 / pi);
         rl_str_add(s, ", blend: ");
         print_number(s, l->blend);
     }
-    rl_str_printf(s, ", %s: ", units[l->unit]);
-    print_numbers(s, l->amount, 3);
+    if (l->has_amount || l->amount[0] != 1 || l->amount[1] != 1 || l->amount[2] != 1) {
+        rl_str_printf(s, ", %s: ", l->has_amount ? rl_light_unit_names[l->unit] : "color");
+        print_numbers(s, l->amount, 3);
+    }
     const struct {
         const char *key;
         double value, usual;

@@ -11,6 +11,8 @@
  *     constant material_t *    one entry a dense stencil index  (generated: every registered pass's rows)
  *     constant light_t *       when .lights is set
  *     constant ambient_t *     when .ambient is set
+ *     global const float *     when .light_tables is set: profiles of the lights; NULL: no light has one
+ *     global const float *     the same: mirror images of the sky; NULL: there is none
  *     constant float *         when .tables is set: what the host computed (global const float * when it may
  *                              be more than the 64 KiB that every device has as constant memory)
  */
@@ -254,8 +256,10 @@ typedef struct rl_pass {
         const rl_step *rows;
         size_t n;
     } steps;
-    bool lights;  /* the kernel gets the lights, and the run the shadow layers that they use */
-    bool ambient; /* the kernel gets the ambient light */
+    bool lights;       /* the kernel gets the lights, and the run the shadow layers that they use */
+    bool ambient;      /* the kernel gets the ambient light */
+    bool light_tables; /* the kernel gets the tables that light_t and ambient_t point into (kernels/shared.h)
+                        */
     /* Computes constant tables from parameters and materials, in double, into `arena`; NULL = none. Pure. */
     rl_code (*tables)(const rl_pass_input *in, rl_arena *arena, rl_tables *out, rl_error *err);
     const void *data; /* for .tables of a pass that is built at run time; the engine does not look at it */

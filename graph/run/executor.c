@@ -59,6 +59,11 @@ static rl_code upload_scenes(rl_executor *x, rl_error *err)
         rl_scene_state *s = &x->scenes[i];
         const rl_materials *m = s->scene.materials;
         code = upload(x, m->data, m->count * m->entry_bytes, &s->materials, err);
+        const rl_light_setup *l = &s->scene.lights;
+        if (!code && l->n_profiles)
+            code = upload(x, l->profiles, l->n_profiles * sizeof *l->profiles, &s->profiles, err);
+        if (!code && l->n_sky)
+            code = upload(x, l->sky, l->n_sky * sizeof *l->sky, &s->sky, err);
         if (!code)
             code = rl_memory_new(x->device, sizeof(frame_t), 0, &s->frame, err);
     }
@@ -122,6 +127,8 @@ void rl_executor_free(rl_executor **executor)
         rl_memory_free(&x->scenes[i].frame);
         rl_memory_free(&x->scenes[i].lights);
         rl_memory_free(&x->scenes[i].ambient);
+        rl_memory_free(&x->scenes[i].profiles);
+        rl_memory_free(&x->scenes[i].sky);
     }
     rl_arena_free(&x->arena);
     rl_free(x);
@@ -252,7 +259,7 @@ static rl_code run_kernel(rl_executor *x, const rl_plan_step *s, const rl_frame_
     const rl_step *step = &pass->steps.rows[s->step];
     rl_memory *args[MOST_ARGUMENTS];
     size_t k = 0;
-    if (pass->ports.n + 6 > MOST_ARGUMENTS)
+    if (pass->ports.n + 8 > MOST_ARGUMENTS)
         return rl_fail(err, RL_E_CONFIG, g->where, "pass '%s' (%s) has too many ports (%zu)", g->name,
                        pass->name, pass->ports.n);
     for (size_t i = 0; i < pass->ports.n; i++)
@@ -266,6 +273,10 @@ static rl_code run_kernel(rl_executor *x, const rl_plan_step *s, const rl_frame_
         args[k++] = scene->lights;
     if (pass->ambient)
         args[k++] = scene->ambient;
+    if (pass->light_tables) {
+        args[k++] = scene->profiles;
+        args[k++] = scene->sky;
+    }
     if (pass->tables)
         args[k++] = n->tables;
     rl_dispatch d;

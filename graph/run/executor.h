@@ -17,12 +17,19 @@ typedef struct rl_executor rl_executor;
 /* The buffers that belong to one frame in flight: what its source fills and what its writers read. */
 typedef struct rl_frame_buffers rl_frame_buffers;
 
+/* What programs of passes with .lights or .light_tables must be able to do (RL_LIGHTS_…, kernel_source.h),
+ * and the large tables of those with .light_tables: kernels/shared.h describes them. NULL and 0: none. */
+typedef struct rl_light_setup {
+    unsigned kinds;
+    const float *profiles, *sky;
+    size_t n_profiles, n_sky; /* floats */
+} rl_light_setup;
+
 /* What the kernels of a node read besides images and parameters: those of node.scene. One, or one a variant
  * of a merged graph. */
 typedef struct rl_scene {
     const rl_materials *materials;
-    bool march; /* some light may have SHADOW_MARCH; without, its code is left out and such a light has no
-                   shadow */
+    rl_light_setup lights; /* the tables must live as long as the executor */
 } rl_scene;
 
 /* Builds the programs of all live nodes, on up to `threads` threads; nodes whose texts are equal share one.

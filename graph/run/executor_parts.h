@@ -14,6 +14,7 @@ typedef struct rl_node_state {
 typedef struct rl_scene_state {
     rl_scene scene;
     rl_memory *materials, *frame, *lights, *ambient;
+    rl_memory *profiles, *sky; /* NULL: none */
 } rl_scene_state;
 
 struct rl_executor {

@@ -29,8 +29,8 @@ static rl_code write_texts(build_job *job, rl_error *err)
         const rl_plan_node *n = i < x->plan->n_nodes ? &x->plan->nodes[i] : NULL;
         if (n)
             code = rl_kernel_text(&arena, x->plan, n,
-                                  x->scenes[x->plan->graph->nodes[n->node].scene].scene.march, &job->texts[i],
-                                  err);
+                                  x->scenes[x->plan->graph->nodes[n->node].scene].scene.lights.kinds,
+                                  &job->texts[i], err);
         else
             code = rl_kernel_convert_text(&arena, &job->texts[i], err);
         job->same[i] = 0;

@@ -84,7 +84,12 @@ static uint64_t hash_lights(const rl_sequence *q)
 {
     static const camera_t cameras[2] = {{.to_world = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}},
                                         {.to_world = {0, -1, 0, 3, 1, 0, 0, 5, 0, 0, 1, 7}}};
-    uint64_t h = q->march;
+    const rl_light_setup *l = &q->setup;
+    uint64_t h = l->kinds;
+    if (l->n_profiles)
+        h = XXH3_64bits_withSeed(l->profiles, l->n_profiles * sizeof *l->profiles, h + 1);
+    if (l->n_sky)
+        h = XXH3_64bits_withSeed(l->sky, l->n_sky * sizeof *l->sky, h + 1);
     for (int i = 0; i < 2; i++) {
         rl_session_light_values(q, &cameras[i], q->light_values);
         h = XXH3_64bits_withSeed(q->light_values, q->n_lights * sizeof *q->light_values, h + 1);

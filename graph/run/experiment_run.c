@@ -326,7 +326,7 @@ static rl_code make_executors(run_state *r, rl_error *err)
             return rl_fail_memory(err, group->n * sizeof *scenes);
         for (size_t i = 0; i < group->n; i++) {
             const rl_sequence *own = rl_experiment_sequence(x, group->members[i], r->capture);
-            scenes[i] = (rl_scene){own->materials, own->march};
+            scenes[i] = (rl_scene){own->materials, own->setup};
         }
         q->has_last = false;
         code = rl_executor_new(x->device, group->plan, scenes, group->n, session->threads, x->log,

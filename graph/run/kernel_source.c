@@ -102,7 +102,7 @@ static void add_structural(const rl_pass *pass, const void *params, rl_str *out)
     }
 }
 
-rl_code rl_kernel_text(rl_arena *arena, const rl_plan *plan, const rl_plan_node *node, bool march,
+rl_code rl_kernel_text(rl_arena *arena, const rl_plan *plan, const rl_plan_node *node, unsigned lights,
                        rl_str *out, rl_error *err)
 {
     const rl_graph_node *n = &plan->graph->nodes[node->node];
@@ -110,8 +110,12 @@ rl_code rl_kernel_text(rl_arena *arena, const rl_plan *plan, const rl_plan_node 
     rl_str_add(out, "#line 1 \"generated\"\n");
     add_ports(plan, node, pass, out);
     add_structural(pass, n->params, out);
-    if (pass->lights)
-        rl_str_printf(out, "#define LIGHTS_MARCH %d\n", march);
+    if (pass->lights || pass->light_tables)
+        rl_str_printf(out,
+                      "#define LIGHTS_MARCH %d\n#define LIGHTS_AREA %d\n#define LIGHTS_PROFILE %d\n"
+                      "#define LIGHTS_SKY %d\n",
+                      !!(lights & RL_LIGHTS_MARCH), !!(lights & RL_LIGHTS_AREA),
+                      !!(lights & RL_LIGHTS_PROFILE), !!(lights & RL_LIGHTS_SKY));
     if (pass->params.n > 0) {
         rl_params_struct_text(pass->params, "params_t", out);
         rl_str_add(out, "\n");

@@ -14,10 +14,20 @@ extern "C" {
  */
 const char *rl_kernel_file(rl_arena *arena, const char *name);
 
-/* `march`: a light asks for SHADOW_MARCH (LIGHTS_MARCH in programs of passes with .lights).
+/* What some light asks for; the code for the rest is left out (LIGHTS_x in programs of passes with .lights or
+ * .light_tables). */
+enum {
+    RL_LIGHTS_MARCH = 1,   /* SHADOW_MARCH; without, such a light has no shadow */
+    RL_LIGHTS_AREA = 2,    /* spheres and rects; without, they are points with their cosine */
+    RL_LIGHTS_PROFILE = 4, /* light_t.profile; without, such a light is even */
+    RL_LIGHTS_SKY = 8,     /* ambient_t.sky_levels; without, the sky has no reflection */
+    RL_LIGHTS_ALL = 15,
+};
+
+/* `lights`: RL_LIGHTS_….
  * HAS_x, WANTS_x, LAYOUT_x, P_x, params_t, material_t, then the sources, each behind a #line with its name.
  */
-rl_code rl_kernel_text(rl_arena *arena, const rl_plan *plan, const rl_plan_node *node, bool march,
+rl_code rl_kernel_text(rl_arena *arena, const rl_plan *plan, const rl_plan_node *node, unsigned lights,
                        rl_str *out, rl_error *err);
 
 /* The program of the conversions between layouts. */

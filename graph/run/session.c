@@ -96,13 +96,14 @@ void rl_session_close(rl_session **session)
     rl_device_close(&s->device);
     rl_ocio_free(&s->ocio);
     rl_pool_free(&s->pool);
+    rl_free(s->sky);
     rl_arena_free(&s->arena);
     rl_free(s);
 }
 
 static rl_code prepare_sequence(rl_session *s, rl_sequence *q, rl_error *err)
 {
-    rl_scene scene = {q->materials, q->march};
+    rl_scene scene = {q->materials, q->setup};
     return rl_executor_new(s->device, q->plan, &scene, 1, s->threads, s->log, &q->executor, err);
 }
 

@@ -25,6 +25,7 @@ typedef struct rl_active_light {
     int shadow_plane, thickness_plane;  /* of the ports, or -1 */
     float to_working[9]; /* from the colour space of its amounts, rows listed; its temperature's colour is in
                             it */
+    int profile;         /* where its profile is in the table of all, 0 = none */
 } rl_active_light;
 
 /* Of a variant: the images that are compared (experiment.h), for people, and the output whose display, view,
@@ -41,7 +42,7 @@ typedef struct rl_sequence {
     rl_frames frames; /* to be processed, in order */
     rl_active_light *lights;
     size_t n_lights;
-    bool march;            /* one of them has `shadow: screen` */
+    rl_light_setup setup;  /* what they and the sky need of the programs, and their tables */
     light_t *light_values; /* of the frame that runs */
     rl_light_planes shadow, thickness;
     const rl_materials *materials;
@@ -67,6 +68,8 @@ struct rl_session {
     rl_ocio *ocio;
     const char *working;
     ambient_t ambient; /* in the working space */
+    float *sky;        /* what surfaces mirror of it (kernels/shared.h), owned; NULL = nothing */
+    size_t n_sky;
     rl_pool *pool;
     rl_device *device;
     rl_sink_output *outputs; /* the pipeline's that are wanted, then one for each dump */

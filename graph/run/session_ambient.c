@@ -1,11 +1,39 @@
 /* The ambient light of a session: written coefficients, lobes and an HDRI, in the working space. */
 #include <string.h>
 
-#include "graph/model/ambient.h"
+#include "graph/model/sky.h"
 #include "graph/run/image_file.h"
 #include "graph/run/session.h"
 
-static rl_code add_hdri(const rl_session *s, rl_ambient *a, rl_error *err)
+/* Row c of the matrix, times intensity. */
+static float convert(const rl_ambient *a, const float m[9], const double rgb[3], int c)
+{
+    double sum = 0;
+    for (int k = 0; k < 3; k++)
+        sum += (double)m[3 * c + k] * a->intensity[k] * rgb[k];
+    return (float)sum;
+}
+
+/* Its mirror images, in the working space. */
+static rl_code add_sky(rl_session *s, const rl_ambient *a, const float *const rgb[3],
+                       const rl_image_file *file, const float m[9], rl_error *err)
+{
+    rl_sky sky;
+    float matrix[9];
+    for (int i = 0; i < 9; i++)
+        matrix[i] = (float)((double)m[i] * a->intensity[i % 3]);
+    rl_code code = rl_sky_make(a, rgb, file->width, file->height, matrix, s->pool, &sky, err);
+    if (code)
+        return code;
+    s->sky = sky.data;
+    s->n_sky = sky.n;
+    s->ambient.sky_levels = RL_SKY_LEVELS;
+    memcpy(s->ambient.sky_side, sky.side, sizeof sky.side);
+    memcpy(s->ambient.sky_at, sky.at, sizeof sky.at);
+    return RL_OK;
+}
+
+static rl_code add_hdri(rl_session *s, rl_ambient *a, const float m[9], rl_error *err)
 {
     rl_image_file file = {0};
     rl_code code = rl_image_file_read(a->hdri, &file, err);
@@ -26,17 +54,10 @@ static rl_code add_hdri(const rl_session *s, rl_ambient *a, rl_error *err)
     if (bad)
         rl_report(s->log, RL_WARNING, a->hdri_where, "%s: %llu samples are NaN or infinite and count as 0",
                   a->hdri, bad);
+    if (!code && a->specular)
+        code = add_sky(s, a, rgb, &file, m, err);
     rl_image_file_free(&file);
     return code;
-}
-
-/* Row c of the matrix, times intensity. */
-static float convert(const rl_ambient *a, const float m[9], const double rgb[3], int c)
-{
-    double sum = 0;
-    for (int k = 0; k < 3; k++)
-        sum += (double)m[3 * c + k] * a->intensity[k] * rgb[k];
-    return (float)sum;
 }
 
 rl_code rl_session_ambient(rl_session *s, rl_error *err)
@@ -49,7 +70,7 @@ rl_code rl_session_ambient(rl_session *s, rl_error *err)
     if (!code)
         code = rl_session_light_matrix(s, a.colorspace, a.colorspace_where, m, err);
     if (!code && a.hdri)
-        code = add_hdri(s, &a, err);
+        code = add_hdri(s, &a, m, err);
     if (code)
         return code;
     ambient_t *out = &s->ambient;

@@ -64,13 +64,16 @@ static rl_code hash_plan(const rl_sequence *q, uint64_t *out, rl_error *err)
     return code;
 }
 
-/* Texts, parameters and tables of all that runs, and the materials. */
-static rl_code hash_kernels(const rl_sequence *q, uint64_t *out, rl_error *err)
+/* Texts, parameters and tables of all that runs, the materials, and what files of lights hold. */
+static rl_code hash_kernels(const rl_session *s, const rl_sequence *q, uint64_t *out, rl_error *err)
 {
     const rl_materials *m = q->materials;
     rl_arena arena = {0};
     rl_code code = RL_OK;
     uint64_t h = add_bytes(0, m->data, m->count * m->entry_bytes);
+    h = add_bytes(h, &s->ambient, sizeof s->ambient);
+    h = add_bytes(h, q->setup.profiles, q->setup.n_profiles * sizeof *q->setup.profiles);
+    h = add_bytes(h, q->setup.sky, q->setup.n_sky * sizeof *q->setup.sky);
     for (size_t i = 0; i < m->n_ids; i++) {
         h = add_bytes(h, &m->ids[i].id, sizeof m->ids[i].id);
         h = add_bytes(h, &m->ids[i].dense, sizeof m->ids[i].dense);
@@ -80,7 +83,7 @@ static rl_code hash_kernels(const rl_sequence *q, uint64_t *out, rl_error *err)
         rl_pass_input in = {.pass = g->pass, .params = g->params, .materials = m};
         rl_tables tables = {0};
         rl_str text = {0};
-        code = rl_kernel_text(&arena, q->plan, &q->plan->nodes[i], q->march, &text, err);
+        code = rl_kernel_text(&arena, q->plan, &q->plan->nodes[i], q->setup.kinds, &text, err);
         if (!code && g->pass->tables)
             code = g->pass->tables(&in, &arena, &tables, err);
         h = add_bytes(add_text(h, rl_str_text(&text)), g->params, g->pass->params_size);
@@ -104,6 +107,6 @@ rl_code rl_session_identity(const rl_session *s, const rl_sequence *q, rl_identi
     if (!code)
         code = hash_plan(q, &out->part[RL_ID_PLAN], err);
     if (!code)
-        code = hash_kernels(q, &out->part[RL_ID_KERNELS], err);
+        code = hash_kernels(s, q, &out->part[RL_ID_KERNELS], err);
     return code;
 }

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "graph/model/temperature.h"
+#include "graph/run/kernel_source.h"
 #include "graph/run/session.h"
 
 static const rl_light_spec *find_light(const rl_lights *lights, const char *name)
@@ -99,6 +100,54 @@ static rl_code light_color(const rl_session *s, const rl_light_spec *spec, float
     return RL_OK;
 }
 
+/* The profiles of all lights, one after the other (kernels/shared.h). */
+static rl_code lay_profiles(rl_session *s, rl_sequence *q, rl_error *err)
+{
+    size_t n = 1;
+    for (size_t i = 0; i < q->n_lights; i++) {
+        const rl_ies *ies = q->lights[i].spec->profile;
+        q->lights[i].profile = ies ? (int)n : 0;
+        n += ies ? 2 + (size_t)ies->vertical * (size_t)ies->horizontal : 0;
+    }
+    if (n == 1)
+        return RL_OK;
+    float *out = rl_arena_array(&s->arena, n, sizeof *out);
+    if (!out)
+        return rl_fail_memory(err, n * sizeof *out);
+    for (size_t i = 0; i < q->n_lights; i++) {
+        const rl_ies *ies = q->lights[i].spec->profile;
+        float *at = out + q->lights[i].profile;
+        if (!ies)
+            continue;
+        at[0] = (float)ies->vertical;
+        at[1] = (float)ies->horizontal;
+        memcpy(at + 2, ies->value, (size_t)ies->vertical * (size_t)ies->horizontal * sizeof *at);
+    }
+    q->setup.kinds |= RL_LIGHTS_PROFILE;
+    q->setup.profiles = out;
+    q->setup.n_profiles = n;
+    return RL_OK;
+}
+
+/* Finds what an active light needs of the capture. */
+static rl_code add_light(const rl_session *s, rl_sequence *q, const rl_light_spec *spec,
+                         const rl_layer **shadow, const rl_layer **thickness, rl_error *err)
+{
+    rl_active_light *a = &q->lights[q->n_lights++];
+    a->spec = spec;
+    a->shadow_plane = a->thickness_plane = -1;
+    q->setup.kinds |= spec->shadow == RL_SHADOW_SCREEN ? RL_LIGHTS_MARCH : 0;
+    q->setup.kinds |= spec->type == RL_LIGHT_SPHERE || spec->type == RL_LIGHT_RECT ? RL_LIGHTS_AREA : 0;
+    rl_code code = bind_shadow(s, q->manifest, a, err);
+    if (!code)
+        code = light_color(s, spec, a->to_working, err);
+    if (a->shadow)
+        shadow[a->shadow_plane = q->shadow.n++] = a->shadow;
+    if (a->thickness)
+        thickness[a->thickness_plane = q->thickness.n++] = a->thickness;
+    return code;
+}
+
 rl_code rl_session_lights(rl_session *s, rl_sequence *q, rl_error *err)
 {
     const rl_manifest *m = q->manifest;
@@ -116,23 +165,15 @@ rl_code rl_session_lights(rl_session *s, rl_sequence *q, rl_error *err)
         code = rl_fail_memory(err, lights.n * sizeof *shadow);
     q->shadow.layers = shadow;
     q->thickness.layers = thickness;
-    for (size_t i = 0; i < lights.n && !code; i++) {
-        const rl_light_spec *spec = &lights.light[i];
-        if (!spec->enabled)
-            continue;
-        rl_active_light *a = &q->lights[q->n_lights++];
-        a->spec = spec;
-        a->shadow_plane = a->thickness_plane = -1;
-        q->march |= spec->shadow == RL_SHADOW_SCREEN;
-        code = bind_shadow(s, m, a, err);
-        if (!code)
-            code = light_color(s, spec, a->to_working, err);
-        if (a->shadow)
-            shadow[a->shadow_plane = q->shadow.n++] = a->shadow;
-        if (a->thickness)
-            thickness[a->thickness_plane = q->thickness.n++] = a->thickness;
+    for (size_t i = 0; i < lights.n && !code; i++)
+        if (lights.light[i].enabled)
+            code = add_light(s, q, &lights.light[i], shadow, thickness, err);
+    if (s->n_sky) {
+        q->setup.kinds |= RL_LIGHTS_SKY;
+        q->setup.sky = s->sky;
+        q->setup.n_sky = s->n_sky;
     }
-    return code;
+    return code ? code : lay_profiles(s, q, err);
 }
 
 /* M * (p, w), M of 3 rows of 4. */
@@ -143,33 +184,62 @@ static void transform(const float m[12], const double p[3], double w, float out[
                          (double)m[4 * i + 3] * w);
 }
 
+/* Half axes of a rect, directions of a profile's table; zero for lights without either. */
+static void light_axes(const rl_light_spec *spec, double side[3], double top[3])
+{
+    bool rect = spec->type == RL_LIGHT_RECT;
+    if (!rect && !spec->profile)
+        return;
+    rl_light_axes(spec, side, top);
+    for (int i = 0; i < 3; i++) {
+        side[i] *= rect ? 0.5 * spec->width_m : 1;
+        top[i] *= rect ? 0.5 * spec->height_m : 1;
+    }
+}
+
+static void light_value(const rl_active_light *a, const camera_t *camera, light_t *out)
+{
+    static const int types[] = {[RL_LIGHT_POINT] = LIGHT_POINT,
+                                [RL_LIGHT_SPOT] = LIGHT_SPOT,
+                                [RL_LIGHT_DIRECTIONAL] = LIGHT_DIRECTIONAL,
+                                [RL_LIGHT_SPHERE] = LIGHT_SPHERE,
+                                [RL_LIGHT_RECT] = LIGHT_RECT};
+    const rl_light_spec *spec = a->spec;
+    light_t l = {.type = types[spec->type],
+                 .shadow = spec->shadow == RL_SHADOW_SCREEN ? SHADOW_MARCH : a->shadow_plane,
+                 .shadow_thickness = a->thickness_plane,
+                 .two_sided = spec->two_sided,
+                 .profile = a->profile};
+    double radiometric[3], inner, outer, area = rl_light_area(spec), side[3] = {0}, top[3] = {0};
+    rl_light_resolve(spec, radiometric);
+    rl_light_cone(spec, &inner, &outer);
+    light_axes(spec, side, top);
+    for (int c = 0; c < 3; c++) {
+        double v = 0;
+        for (int k = 0; k < 3; k++)
+            v += (double)a->to_working[3 * c + k] * radiometric[k];
+        l.intensity[c] = (float)v;
+        l.position[c] = (float)spec->position_m[c];
+        l.direction[c] = (float)spec->direction[c];
+        l.side[c] = (float)side[c];
+        l.top[c] = (float)top[c];
+    }
+    l.cos_inner = (float)inner;
+    l.cos_outer = (float)outer;
+    l.radius =
+        (float)(spec->type == RL_LIGHT_RECT ? 0.5 * hypot(spec->width_m, spec->height_m) : spec->radius_m);
+    l.radiance = (float)(area > 0 ? 1 / area : 0);
+    if (spec->in_camera_space) {
+        transform(camera->to_world, spec->position_m, 1, l.position);
+        transform(camera->to_world, spec->direction, 0, l.direction);
+        transform(camera->to_world, side, 0, l.side);
+        transform(camera->to_world, top, 0, l.top);
+    }
+    *out = l;
+}
+
 void rl_session_light_values(const rl_sequence *q, const camera_t *camera, light_t *out)
 {
-    for (size_t i = 0; i < q->n_lights; i++) {
-        const rl_active_light *a = &q->lights[i];
-        const rl_light_spec *spec = a->spec;
-        light_t l = {.shadow = spec->shadow == RL_SHADOW_SCREEN ? SHADOW_MARCH : a->shadow_plane,
-                     .shadow_thickness = a->thickness_plane};
-        l.type = spec->type == RL_LIGHT_POINT  ? LIGHT_POINT
-                 : spec->type == RL_LIGHT_SPOT ? LIGHT_SPOT
-                                               : LIGHT_DIRECTIONAL;
-        double radiometric[3], inner, outer;
-        rl_light_resolve(spec, radiometric);
-        rl_light_cone(spec, &inner, &outer);
-        for (int c = 0; c < 3; c++) {
-            double v = 0;
-            for (int k = 0; k < 3; k++)
-                v += (double)a->to_working[3 * c + k] * radiometric[k];
-            l.intensity[c] = (float)v;
-            l.position[c] = (float)spec->position_m[c];
-            l.direction[c] = (float)spec->direction[c];
-        }
-        l.cos_inner = (float)inner;
-        l.cos_outer = (float)outer;
-        if (spec->in_camera_space) {
-            transform(camera->to_world, spec->position_m, 1, l.position);
-            transform(camera->to_world, spec->direction, 0, l.direction);
-        }
-        out[i] = l;
-    }
+    for (size_t i = 0; i < q->n_lights; i++)
+        light_value(&q->lights[i], camera, &out[i]);
 }

@@ -54,7 +54,9 @@ void rl_session_need(const rl_session *s, const rl_sequence *q, int in_flight, r
     if (!q->geometry.columns)
         return;
     size_t pixels = (size_t)q->geometry.width * (size_t)q->geometry.height;
-    out->plan = rl_plan_bytes(q->plan, &q->geometry, in_flight);
+    /* tables of lights are kept on the host, too */
+    out->plan = add(rl_plan_bytes(q->plan, &q->geometry, in_flight),
+                    2 * sizeof(float) * (q->setup.n_profiles + q->setup.n_sky));
     out->decode = add((size_t)q->decode_bytes,
                       rl_session_keeps_ids(s) ? pixels * sizeof(uint32_t) * (size_t)in_flight : 0);
     out->encode = add(encode_bytes(s, q), FIXED + (size_t)s->threads * A_THREAD);

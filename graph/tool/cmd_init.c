@@ -38,32 +38,54 @@ static void add_vector(rl_str *out, const char *key, const double v[3])
 /* ---- lights ----------------------------------------------------------------------------------------------
  */
 
+/* What area lights and lights with ies have besides. */
+static void add_shape(rl_str *out, const rl_light_spec *l)
+{
+    const struct {
+        const char *key;
+        double metres;
+    } lengths[] = {{"radius", l->radius_m}, {"width", l->width_m}, {"height", l->height_m}};
+    for (size_t i = 0; i < sizeof lengths / sizeof *lengths; i++)
+        if (lengths[i].metres > 0) {
+            rl_str_printf(out, ", %s: ", lengths[i].key);
+            add_number(out, lengths[i].metres);
+        }
+    if (l->type == RL_LIGHT_RECT || l->ies)
+        add_vector(out, "up", l->up);
+    if (l->two_sided)
+        rl_str_add(out, ", two_sided: true");
+    if (l->ies) {
+        rl_str_add(out, ", ies: ");
+        add_text(out, l->ies);
+    }
+}
+
 static void add_light(rl_str *out, const rl_light_spec *l)
 {
-    static const char *const types[] = {"point", "spot", "directional"};
-    static const char *const units[] = {"intensity", "irradiance", "candela", "lumen", "lux"};
     double position[3];
     for (int i = 0; i < 3; i++) /* micrometres: the unit's factor leaves noise behind them */
         position[i] = round(l->position_m[i] * 1e6) / 1e6;
     rl_str_add(out, "#  ");
     add_text(out, l->name);
-    rl_str_printf(out, ": {type: %s", types[l->type]);
+    rl_str_printf(out, ": {type: %s", rl_light_type_names[l->type]);
     if (l->type != RL_LIGHT_DIRECTIONAL)
         add_vector(out, "position", position);
-    if (l->type != RL_LIGHT_POINT)
+    if (l->direction[0] != 0 || l->direction[1] != 0 || l->direction[2] != 0)
         add_vector(out, "direction", l->direction);
+    add_shape(out, l);
     if (l->type == RL_LIGHT_SPOT) {
         rl_str_add(out, ", angle: ");
         add_number(out, round(l->angle * 180 / 3.14159265358979323846 * 1e6) / 1e6);
         rl_str_add(out, ", blend: ");
         add_number(out, l->blend);
     }
-    add_vector(out, units[l->unit], l->amount);
+    if (l->has_amount || l->amount[0] != 1 || l->amount[1] != 1 || l->amount[2] != 1)
+        add_vector(out, l->has_amount ? rl_light_unit_names[l->unit] : "color", l->amount);
     if (l->exposure != 0) {
         rl_str_add(out, ", exposure: ");
         add_number(out, l->exposure);
     }
-    if (l->unit >= RL_LIGHT_CANDELA && l->efficacy != 683) {
+    if ((l->unit >= RL_LIGHT_CANDELA || !l->has_amount) && l->efficacy != 683) {
         rl_str_add(out, ", efficacy: ");
         add_number(out, l->efficacy);
     }
