@@ -42,7 +42,7 @@ class Sections {
     if (!list.length) return null;
     const where = o => {
       const capture = this.metrics.captures[o.capture], pair = this.metrics.pairs[o.pair];
-      return h("tr", {}, h("td", {}, capture ? capture.name : ""), h("td", {}, pair ? pairName(this.metrics, pair) : ""),
+      return h("tr", {}, h("td", {}, capture ? capture.name : ""), h("td", {}, pair ? pairName(this.metrics, pair) : [(this.metrics.variants[o.variant] || {}).name, o.node].filter(Boolean).join(", ")),
         h("td", {}, h("button", {type: "button", class: "link", onclick: () => this.show(o.capture, o.frame, o.pair)}, `frame ${o.frame}`)),
         h("td", {}, materialName(o.material)), h("td", {class: "num"}, number(o.value, 4)));
     };
@@ -50,7 +50,7 @@ class Sections {
       const over = t.over || [], head = h("p", {class: over.length ? "verdict bad" : "verdict good"},
         h("b", {}, over.length ? "failed" : "passed"), ` ${t.what} = ${number(t.limit, 4)}` + (over.length ? `: ${plural(over.length, "value")} beyond it` : ""));
       if (!over.length) return head;
-      const table = rows => h("div", {class: "scroll"}, h("table", {}, h("thead", {}, h("tr", {}, ["Capture", "Pair", "Frame", "Material", "Value"].map(x =>
+      const table = rows => h("div", {class: "scroll"}, h("table", {}, h("thead", {}, h("tr", {}, ["Capture", "What", "Frame", "Material", "Value"].map(x =>
         h("th", {scope: "col", class: x === "Value" ? "num" : null}, x)))), h("tbody", {}, rows.map(where))));
       return [head, table(over.slice(0, 12)), over.length > 12 ? h("details", {}, h("summary", {}, `${over.length - 12} more`), table(over.slice(12))) : null];
     }));
@@ -155,26 +155,39 @@ class Sections {
 
   /* ---- energy ---- */
 
+  /* Means over frames a pixel; a table a variant. */
   energy() {
-    const list = this.metrics.energy || [];
+    const list = this.metrics.energy || [], variants = [...new Set(list.map(r => r.variant))];
     if (!list.length) return null;
-    const sum = v => (v ? (v[0] + v[1] + v[2]) / 3 : null), groups = new Map();
+    const box = h("div", {class: "scroll", tabindex: 0, role: "region", "aria-label": "Table of the energy"});
+    const draw = v => box.replaceChildren(this.energyTable(list.filter(r => r.variant === v)));
+    draw(variants[0]);
+    const bar = variants.length > 1 ? h("div", {class: "controls"}, h("div", {class: "control"}, h("label", {for: "energy-variant"}, "Variant"),
+      select({id: "energy-variant"}, variants.map(v => ({value: v, label: (this.metrics.variants[v] || {}).name})), variants[0], v => draw(Number(v))))) : null;
+    return this.section("energy", "Energy", bar, h("div", {}, h("p", {class: "small"},
+      "What passes take in and give out a pixel: the mean of red, green and blue, and of the frames. The rest are shares of what came in."), box));
+  }
+
+  energyTable(list) {
+    const parts = [["border", "At borders"], ["off_screen", "Off screen"], ["clamped", "Clamped"], ["redistributed", "Redistributed"]].filter(([k]) => list.some(r => r[k]));
+    const mean = v => (v ? (v[0] + v[1] + v[2]) / 3 : 0), groups = new Map(), many = this.metrics.captures.length > 1;
     for (const r of list) {
-      const key = JSON.stringify([r.capture, r.node, r.variant, r.material]);
-      if (!groups.has(key)) groups.set(key, {...r, n: 0, sums: {}});
-      const g = groups.get(key);
-      g.n++;
-      for (const k of ["in", "out", "border", "off_screen", "clamped"]) g.sums[k] = (g.sums[k] || 0) + (sum(r[k]) || 0);
+      const key = JSON.stringify([r.capture, r.node, r.material]), g = groups.get(key) || {...r, pixels: 0, sums: {}};
+      groups.set(key, g);
+      g.pixels += r.pixels || 1;
+      for (const k of ["in", "out", ...parts.map(p => p[0])]) g.sums[k] = (g.sums[k] || 0) + mean(r[k]);
     }
-    const part = (g, k) => (g.sums.in > 0 ? fixed(100 * g.sums[k] / g.sums.in, 2) + THIN + "%" : NONE);
-    const head = ["Node", "Variant", "Material", "In", "Out", "At borders", "Off screen", "Clamped"], many = this.metrics.captures.length > 1;
-    return this.section("energy", "Energy", h("p", {class: "small"}, "Mean of red, green and blue, and of the frames; shares of what came in."),
-      h("div", {class: "scroll", tabindex: 0, role: "region", "aria-label": "Table of the energy"}, h("table", {},
-        h("thead", {}, h("tr", {}, many ? h("th", {scope: "col"}, "Capture") : null, head.map((x, i) => h("th", {scope: "col", class: i > 2 ? "num" : null}, x)))),
-        h("tbody", {}, [...groups.values()].map(g => h("tr", {class: g.material === null ? "whole" : null},
-          many ? h("td", {}, (this.metrics.captures[g.capture] || {}).name) : null,
-          h("th", {scope: "row"}, g.node, h("small", {}, " " + (g.pass || ""))), h("td", {}, (this.metrics.variants[g.variant] || {}).name), h("td", {}, materialName(g.material)),
-          h("td", {class: "num"}, number(g.sums.in / g.n)), ["out", "border", "off_screen", "clamped"].map(k => h("td", {class: "num"}, part(g, k)))))))));
+    const share = (g, v) => (g.sums.in > 0 ? fixed(100 * v / g.sums.in, 2) + THIN + "%" : NONE), num = v => h("td", {class: "num"}, v);
+    const head = [...(many ? ["Capture"] : []), "Node", "Material", "In", "Out", "Out \u2212 in", ...parts.map(p => p[1])];
+    let before = "";
+    return h("table", {}, h("thead", {}, h("tr", {}, head.map((x, i) => h("th", {scope: "col", class: i > (many ? 2 : 1) ? "num" : null}, x)))),
+      h("tbody", {}, [...groups.values()].map(g => {
+        const name = `${g.capture} ${g.node}`, first = name !== before;
+        before = name;
+        return h("tr", {class: g.material === null ? "whole" : null}, many ? h("td", {}, first ? (this.metrics.captures[g.capture] || {}).name : "") : null,
+          h("th", {scope: "row"}, first ? [g.node, h("small", {}, " " + (g.pass || ""))] : h("span", {class: "hidden"}, g.node)), h("td", {}, materialName(g.material)),
+          num(number(g.sums.in / g.pixels)), num(number(g.sums.out / g.pixels)), num(share(g, g.sums.out - g.sums.in)), parts.map(([k]) => num(share(g, g.sums[k]))));
+      })));
   }
 
   /* ---- cost ---- */

@@ -36,7 +36,7 @@ function number(x, digits = 3) {
 }
 
 /* A fixed number of decimals, for columns of pixels. */
-const fixed = (x, n) => (x === null || !Number.isFinite(x) ? NONE : x.toFixed(n).replace("-", MINUS));
+const fixed = (x, n) => (x === null || !Number.isFinite(x) ? NONE : x.toFixed(n).replace(/^-(?=[0.]*$)/, "").replace("-", MINUS));
 
 const METRIC_NAMES = {flip: "FLIP", hdrflip: "HDR-FLIP", psnr: "PSNR", ssim: "SSIM", rmse: "RMSE", max: "Max diff"};
 const METRIC_UNITS = {psnr: "dB"};
