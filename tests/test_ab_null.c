@@ -201,11 +201,11 @@ static void test_marks(void **state)
 }
 
 /* The promise of ab.h: a pair that differs in its random choices alone gets a mark of a material and metric
- * in at most 1 / (R + 1) of runs; here R = 2, 200 runs of two frames. */
+ * in at most 1 / (R + 1) of runs; here R = 2, 100 runs of two frames. */
 static void test_false_positives(void **state)
 {
     (void)state;
-    enum { RUNS = 200 };
+    enum { RUNS = 100 };
     int marks = 0;
     fake_plan_make(&p, 4, 2);
     for (uint32_t run = 0; run < RUNS; run++) {
@@ -230,8 +230,8 @@ static void test_false_positives(void **state)
         marks += any;
         rl_ab_measure_free(&m);
     }
-    /* 1/3 is the bound; three standard deviations of 200 tosses are 0.1. It does happen. */
-    assert_true(marks <= RUNS * 0.433);
+    /* 1/3 is the bound; three standard deviations of 100 tosses are 0.14. It does happen. */
+    assert_true(marks <= RUNS * 0.475);
     assert_true(marks > 0);
 }
 

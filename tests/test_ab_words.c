@@ -201,8 +201,15 @@ static void test_table(void **state)
     ab_values_make(&v, e, 4, 2);
     add_two_frames(0, 1);
     ab_values_null(&v, 0, FAKE_SKIN, 0.003);
+    v.p.plan.stochastic = true;
     rl_ab_table(&v.report, &text);
     assert_string_equal(rl_str_text(&text), want);
+    rl_str_free(&text);
+    v.p.plan.stochastic = false;
+    v.results.n_nulls = 0;
+    rl_ab_table(&v.report, &text);
+    assert_non_null(strstr(rl_str_text(&text), "\nNo pass draws random numbers: every difference"));
+    assert_null(strchr(rl_str_text(&text), '*'));
     rl_str_free(&text);
 }
 
@@ -277,7 +284,7 @@ static void test_thresholds_that_check_nothing(void **state)
     assert_int_equal(err.code, RL_E_DATA);
     assert_non_null(strstr(err.text, "there is no ssim.mean to check: no frame was compared"));
     err = (rl_error){0};
-    check(&arena, "energy=0.01", &err); /* no ledger was kept */
+    check(&arena, "energy=0.01", &err); /* there is no ledger */
     assert_int_equal(err.code, RL_E_DATA);
     rl_threshold t;
     static const struct {

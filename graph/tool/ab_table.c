@@ -186,6 +186,8 @@ static void add_legend(const rl_ab_report *r, bool any, rl_str *out)
     rl_str_add(out,
                "Mean over the frames, then the worst frame. Pixels without material are left out. FLIP and "
                "SSIM look\naround a pixel: what is beside a material shows in its numbers.\n");
+    if (!r->plan->stochastic)
+        rl_str_add(out, "No pass draws random numbers: every difference is one of the variants.\n");
     if (!r->results->n_nulls)
         return;
     if (any)
