@@ -58,7 +58,8 @@ static rl_code open_sheet(rl_ab_run *r, rl_error *err)
         numbers[i] = rl_session_frame(first, 0, i);
     size_t index = rl_ab_sheet_choose(tool->args.report_frames, numbers, n);
     char *title =
-        rl_arena_printf(tool->arena, "%s frame %lld, %s", rl_session_capture_name(first, 0), numbers[index],
+        rl_arena_printf(tool->arena, "%s frame %lld, %s, %s", rl_session_capture_name(first, 0),
+                        numbers[index], rl_experiment_image_name(r->experiment, 0, RL_COMPARED_LINEAR),
                         rl_experiment_image_name(r->experiment, 0, RL_COMPARED_DISPLAY));
     rl_code code =
         title ? rl_image_file_check(r->sheet_path, (rl_where){.file = place}, err) : rl_fail_memory(err, 64);
