@@ -17,7 +17,7 @@ const tickText = v => String(Number(v.toPrecision(6))).replace("-", MINUS);
 /* From 0 where 0 is "no difference", else around what there is. */
 function range(metric, values) {
   if (!values.length) return [0, 1];
-  const most = Math.max(...values), least = Math.min(...values);
+  const most = values.reduce((a, b) => Math.max(a, b)), least = values.reduce((a, b) => Math.min(a, b));
   if (!metricRises(metric)) return [0, most > 0 ? most * 1.06 : 1];
   const pad = (most - least) * 0.1 || Math.abs(most) * 0.02 || 1;
   return [least - pad, most + pad];
@@ -81,7 +81,7 @@ class LinePlot {
     const whole = this.series.find(x => x.main) || this.series[0];
     const list = whole ? [...whole.values.values()].filter(v => v !== null) : [];
     this.svg.setAttribute("aria-label", `${metricName(this.metric)} over ${this.frames.length} frames` +
-      (list.length ? `, ${whole.name}: ${number(Math.min(...list))} to ${number(Math.max(...list))}` : "") +
+      (list.length ? `, ${whole.name}: ${number(list.reduce((a, b) => Math.min(a, b)))} to ${number(list.reduce((a, b) => Math.max(a, b)))}` : "") +
       "; left and right read a frame, Enter shows it");
   }
 

@@ -93,7 +93,7 @@ class Sections {
 
   chanceWords() {
     const m = this.metrics, rate = m.false_positives;
-    return `A dot marks what is beyond chance: beyond all that other seeds of ${m.variants[0].name} make` + (m.seeds ? ` (${m.seeds} seeds)` : "") + "." +
+    return `A dot marks a mean beyond chance: beyond all that other seeds of ${m.variants[0].name} make` + (m.seeds ? ` (${m.seeds} seeds)` : "") + "." +
       (rate > 0 ? ` Without a cause, a material and metric gets one in at most 1 of ${Math.round(1 / rate)} runs.` : "");
   }
 

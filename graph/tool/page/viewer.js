@@ -99,7 +99,7 @@ class Viewer {
   }
 
   controls() {
-    const displays = [...(this.page.displays.length ? [{value: "pipeline", label: this.page.displays[0].name}] : []),
+    const displays = [...(this.page.displays.length ? [{value: "pipeline", label: this.page.displays.length > 1 ? "each its own" : this.page.displays[0].name}] : []),
                       {value: "srgb", label: "plain sRGB"}];
     this.exposure = h("input", {id: "exposure", type: "range", min: EXPOSURES.low, max: EXPOSURES.high,
                                 step: EXPOSURES.step, value: 0,
@@ -136,6 +136,7 @@ class Viewer {
       parts.push(`This page holds ${this.held.length} of ${plural(total, "frame")}; the others are linked below.`);
     if (page.leftOut)
       parts.push(`${plural(page.leftOut, "more frame")} did not fit its ${Math.round(page.budget / 1048576)}\u00a0MiB.`);
+    if (this.held.some(f => f.encoded)) parts.push("The reference is no scene-linear image: it is shown as plain sRGB.");
     for (const d of page.displays)
       if (d.pixels)
         parts.push(`${d.name} is a table of ${d.n}\u00b3 colours here: off by ${number(d.errorMean * 255, 2)}/255 in the ` +
