@@ -64,16 +64,14 @@ class PlanView {
         .map(p => (p.role === "history" ? "past " : "") + name(p.buffer)).join(", ");
     };
     const total = times.reduce((a, b) => a + (b || 0), 0);
+    const time = t => h("span", {class: "time"}, t === null ? NONE
+      : [h("span", {class: "track"}, h("span", {class: "fill main", style: {width: t / most * 100 + "%"}})), h("span", {class: "value"}, number(t))]);
+    const row = (x, i) => [i, this.stepName(x), ...(timed ? [time(times[i])] : []), h("small", {}, list(x, false)), h("small", {}, list(x, true)),
+                           h("small", {}, moved(x) ? bytes(moved(x)) : NONE)];
     return this.section("steps", "Steps", h("p", {class: "small"},
         timed ? `${number(total)} ms on the device a frame, the mean of ${plural(this.times.frames, "frame")} of the trace. ` : null,
         this.plan.buffers.some(b => b.layout === "phase4") ? "\u2032 marks the phase4 layout." : null),
-      h("div", {class: "scroll", tabindex: 0, role: "region", "aria-label": "Table of the steps"}, h("table", {class: "steps"},
-        h("thead", {}, h("tr", {}, [h("th", {scope: "col"}, "#"), h("th", {scope: "col"}, "Step"), timed ? h("th", {scope: "col"}, "ms") : null,
-          h("th", {scope: "col"}, "Reads"), h("th", {scope: "col"}, "Writes"), h("th", {scope: "col", class: "num"}, "Buffers")])),
-        h("tbody", {}, this.plan.steps.map((x, i) => h("tr", {}, h("td", {class: "small"}, i), h("th", {scope: "row"}, this.stepName(x)),
-          timed ? h("td", {class: "time"}, times[i] === null ? NONE : [h("span", {class: "track"}, h("span", {class: "fill main", style: {width: times[i] / most * 100 + "%"}})),
-                                                                  h("span", {class: "value"}, number(times[i]))]) : null,
-          h("td", {class: "small"}, list(x, false)), h("td", {class: "small"}, list(x, true)), h("td", {class: "num small"}, moved(x) ? bytes(moved(x)) : NONE)))))));
+      table("Steps", ["No.", "Step", ...(timed ? ["ms"] : []), "Reads", "Writes", "#Buffers"], this.plan.steps.map(row), {class: "steps"}));
   }
 
   /* A row a buffer, but one a slot: what shares memory is in one line. */
@@ -113,11 +111,13 @@ class PlanView {
     if (!m) return null;
     const sums = Object.keys(CLASSES).map(k => ({name: CLASSES[k], kind: k, bytes: rows.filter(r => r.kind === k).reduce((t, r) => t + r.copies * (r.bytes || 0), 0)})).filter(x => x.bytes);
     const parts = peak ? ["buffers", "reading", "writing", "checkpoint"].filter(k => peak[k]).map(k => ({name: k, bytes: peak[k]})) : [];
-    const bars = (title, list, total) => h("figure", {class: "multiple bars"}, h("figcaption", {}, title, h("small", {}, " " + bytes(total))), h("dl", {}, list.map(x => [
-      h("dt", {}, x.name), h("dd", {}, h("span", {class: "track"}, h("span", {class: "fill " + (x.kind || "main"), style: {width: x.bytes / Math.max(...list.map(y => y.bytes)) * 100 + "%"}})), h("span", {class: "value"}, bytes(x.bytes)))])));
+    const chart = (title, list, total) => {
+      const most = Math.max(...list.map(y => y.bytes));
+      return bars(title, bytes(total), list.map(x => ({name: x.name, class: x.kind || "main", share: x.bytes / most, value: bytes(x.bytes)})));
+    };
     const saved = m.bytes_unshared > m.bytes ? ` Without shared slots the buffers would take ${bytes(m.bytes_unshared)}.` : "";
     return this.section("memory", "Memory", h("p", {class: "small"}, `${m.data_window[2]} \u00d7 ${m.data_window[3]} pixels in buffers of ${m.columns} \u00d7 ${m.rows}, ${plural(m.in_flight, "frame")} in flight.` + saved),
-      h("div", {class: "multiples"}, bars("Buffers", sums, m.bytes), parts.length ? bars("Peak of a run", parts, peak.total) : null));
+      h("div", {class: "multiples"}, chart("Buffers", sums, m.bytes), parts.length ? chart("Peak of a run", parts, peak.total) : null));
   }
 
   all() { return [this.graph(), this.steps(), this.lifetimes(), this.memory()].filter(Boolean); }

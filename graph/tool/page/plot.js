@@ -139,15 +139,9 @@ class LinePlot {
 /* A bar a material; a tick where chance ends. rows: [{name, color, value, bound, beyond}] */
 function barPlot(metric, rows) {
   const values = rows.flatMap(r => [r.value, r.bound]).filter(v => v !== null && v !== undefined);
-  const [low, high] = range(metric, values), share = v => clamp((v - low) / (high - low), 0, 1) * 100 + "%";
-  return h("figure", {class: "multiple bars"},
-    h("figcaption", {title: METRIC_HELP[metric]}, metricName(metric),
-      METRIC_UNITS[metric] ? h("small", {}, " " + METRIC_UNITS[metric]) : null),
-    h("dl", {}, rows.map(r => [
-      h("dt", {}, r.name),
-      h("dd", {}, h("span", {class: "track"},
-          r.value === null ? null : h("span", {class: "fill", style: {width: share(r.value), "--c": r.color}}),
-          r.bound === null || r.bound === undefined ? null : h("span", {class: "limit", style: {left: share(r.bound)}, title: "what chance makes: " + number(r.bound)})),
-        h("span", {class: "value"}, number(r.value), r.beyond ? h("b", {class: "beyond", title: "beyond what chance makes"}, "\u25cf") : null))
-    ])));
+  const [low, high] = range(metric, values), share = v => (typeof v === "number" ? (v - low) / (high - low) : null);
+  const dot = () => h("b", {class: "beyond", title: "beyond what chance makes"}, "\u25cf");
+  return bars({text: metricName(metric), help: METRIC_HELP[metric]}, METRIC_UNITS[metric], rows.map(r => ({
+    name: r.name, color: r.color, share: share(r.value), value: [number(r.value), r.beyond ? dot() : null],
+    limit: share(r.bound), about: "what chance makes: " + number(r.bound)})));
 }
