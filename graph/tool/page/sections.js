@@ -46,7 +46,7 @@ class Sections {
     const rows = over => table("Values beyond the threshold", ["Capture", "What", "Frame", "Material", "#Value"], over.map(row));
     const verdict = t => {
       const over = t.over || [], bad = over.length > 0;
-      const words = ` ${t.what} = ${number(t.limit, 4)}` + (bad ? `: ${plural(over.length, "value")} beyond it` : "");
+      const words = ` ${t.what} = ${t.limit}` + (bad ? `: ${plural(over.length, "value")} beyond it` : "");
       const more = over.length > 12 ? h("details", {}, h("summary", {}, `${over.length - 12} more`), rows(over.slice(12))) : null;
       return [h("p", {class: bad ? "verdict bad" : "verdict good"}, h("b", {}, bad ? "failed" : "passed"), words),
               bad ? rows(over.slice(0, 12)) : null, more];

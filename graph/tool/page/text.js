@@ -118,7 +118,8 @@ function segmented(label, options, value, change) {
 
 /* The system's choice until somebody chooses. */
 function switchTheme() {
-  const root = document.documentElement, dark = root.dataset.theme ? root.dataset.theme === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
+  const root = document.documentElement, system = matchMedia("(prefers-color-scheme: dark)").matches;
+  const dark = root.dataset.theme ? root.dataset.theme === "dark" : system;
   root.dataset.theme = dark ? "light" : "dark";
   byId("theme").setAttribute("aria-label", `Theme: ${root.dataset.theme}`);
 }
