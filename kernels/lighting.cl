@@ -37,7 +37,8 @@ static inline void sum_lights(constant material_t *m, const surface_t *s, consta
                               global const float *shadow_thickness, int x, int y, floatv *diffuse, floatv *specular)
 {
     int at = rl_index(f, x, y);
-    int transmits = m->has_profile && m->shading_transmission && m->profile_transmission != OPAQUE;
+    int transmits = m->has_profile && m->shading_transmission && m->profile_transmission != OPAQUE &&
+                    m->profile_transmission != GATHER;
     int scattered = scatters(m);
     for (int i = 0; i < f->lights; i++) {
         constant light_t *light = &lights[i];
@@ -60,9 +61,11 @@ static inline void sum_lights(constant material_t *m, const surface_t *s, consta
         floatv lit = r.falloff * r.visibility * fmax(r.nl, 0.0f);
         floatv front = entered * r.visibility * fmax(r.nl, 0.0f);
         for (int c = 0; c < 3; c++) {
+            floatv e = front;
             if (scattered)
-                front = r.falloff * scatter_visibility(s, &r) * sg_irradiance(&s->sg[c], dot3(s->bent[c], r.l));
-            diffuse[c] += light->intensity[c] * front;
+                e = mix(front, r.falloff * scatter_visibility(s, &r) * sg_irradiance(&s->sg[c], dot3(s->bent[c], r.l)),
+                        s->blurred[c]);
+            diffuse[c] += light->intensity[c] * e;
         }
         if (transmits && rl_any(r.nl < 0.0f)) {
             floatv back = fmax(-r.nl, 0.0f), t[3];

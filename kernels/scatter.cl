@@ -212,7 +212,10 @@ static inline floatv scatter_mean_slope(global const float *depth, global const 
  *
  * What is hidden counts as no less and no more lit than what is seen. On a captured head, against a
  * path-traced truth, the error is 0.54 to 0.67 of that of `area`; on a ball of wax 0.39, 0.48 and 1.34 of it
- * (red, green, blue; `plain` has 4.5, 4.3 and 3.0 times as much). sss_burley takes 1.7 times the time. */
+ * (red, green, blue; `plain` has 4.5, 4.3 and 3.0 times as much). tests/test_sss_curved.c has other shapes:
+ * 0.13 of it on a ball, 0.32 on waves, 1.26 on a cylinder. sss_burley takes 1.5 times the time, for two sets
+ * of weights a tap; those of the plane for every third tap alone take 1.3 times, and double the noise of a
+ * frame. */
 typedef struct plane_t {
     floatv x, y; /* slopes, metres of depth a pixel */
     floatv cosine;
@@ -371,19 +374,19 @@ static inline void scatter_reject(rejected_t *r, int c, floatv weight, intv insi
     r->off_screen[c] += scatter_keep(weight, ~inside);
 }
 
-/* Channel c of a result: the pixel's own light, the weights w of the samples that count and their light times
- * weights, those that are rejected (`black`: they are in w), and what the filter gives, before its clamps and
- * after. */
-static inline void scatter_account(floatv *out, int c, floatv own, floatv w, floatv light, const rejected_t *r,
-                                   intv black, floatv unclamped, floatv given, float least)
+/* Channel c of a result: the pixel's own light, the share of the result that is not left to it, the weights w
+ * of the samples that count and their light times weights, those that are rejected (`black`: they are in w),
+ * and what the filter gives, before its clamps and after. */
+static inline void scatter_account(floatv *out, int c, floatv own, float share, floatv w, floatv light,
+                                   const rejected_t *r, intv black, floatv unclamped, floatv given, float least)
 {
     floatv all = w + scatter_keep(r->border[c] + r->off_screen[c], ~black);
     intv any = all > least;
     floatv per = scatter_keep(1.0f / all, any);
-    out[3 + c] = own * r->border[c] * per;
-    out[6 + c] = own * r->off_screen[c] * per;
+    out[3 + c] = share * own * r->border[c] * per;
+    out[6 + c] = share * own * r->off_screen[c] * per;
     out[9 + c] = unclamped - given;
-    out[12 + c] = scatter_keep(unclamped - light * per, any);
+    out[12 + c] = scatter_keep(unclamped - fma((floatv)share, light * per - own, own), any);
 }
 
 /* A result's part of the ledger, of the pixels at `at`; planes are `plane` floats apart. */

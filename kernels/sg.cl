@@ -89,7 +89,7 @@ static inline floatv lobe_irradiance(constant ambient_t *a, int c, const floatv 
         constant lobe_t *lobe = &a->lobe[i];
         floatv lambda = lobe->sharpness, mu = fma(n[0], lobe->axis[0], fma(n[1], lobe->axis[1], n[2] * lobe->axis[2]));
         if (scattered)
-            lambda = sg_convolved(band1 * sg_band1(lambda));
+            lambda = rl_select(sg_convolved(band1 * sg_band1(lambda)), lambda, band1 >= 1.0f);
         sg_t s = sg_make(lambda);
         sum = fma(lobe->flux[c], sg_irradiance(&s, mu), sum);
     }

@@ -3,9 +3,11 @@
  * load contiguous; one scale serves the lanes of a vector that are about equally far away, and each lane's
  * weights use its own.
  *
- * Tap i stands for the light of 1/n of the profile at its exact place, and reads the pixel that this place is
- * in. So the sum over taps tends to the sum over pixels of the profile's integral over the pixel's square:
- * sss_reference.
+ * Tap i stands for the light of 1/n of a profile at its exact place, and reads the pixel that this place is
+ * in: of the mixture of the channels' profiles, so that narrow ones have taps too (passes/burley.h). So the
+ * sum over taps tends to the sum over pixels of the profile's integral over the pixel's square:
+ * sss_reference. On a plane that faces the camera the mean over patterns is that sum, whatever n is (settle()
+ * below).
  *
  * How wrong: the common scale is off by up to 11 % for a lane, so its filter ends between 0.89 and 1.11
  * r_max, where 0.25 % of the light is (its weights are exact). Laid into the tangent plane (`orientation:
@@ -29,17 +31,17 @@
 #define MOST_PATTERNS 15
 #define PATTERN_TAPS  4096
 
-enum { ROTATION_NONE = 0, ROTATION_WHITE = 1, ROTATION_IGN = 2, ROTATION_BLUE = 3 };
-
 #if P_weighting != WEIGHTING_PLAIN
 #define AREA(x) x
 #else
 #define AREA(x)
 #endif
 
-/* Host tables: directions (cos, sin), then for each pattern its x, y, weights, padded to TAP_BLOCK. */
-#define TABLE_TURNS 0
-#define TABLE_TAPS  (2 * TURNS)
+/* Host tables, passes/sss_burley.c: directions (cos, sin), where a material's patterns start, and for each
+ * pattern its x, y, weights, padded to TAP_BLOCK, and a channel's sum of weights beside the patterns' mean.
+ */
+#define TABLE_TURNS    0
+#define TABLE_PATTERNS (2 * TURNS)
 
 /* What is constant for some lanes of a vector. */
 typedef struct group_t {
@@ -57,42 +59,10 @@ typedef struct group_t {
     intv keep; /* all bits: samples that are none count as black */
 } group_t;
 
-/* What tells the pattern of a phase in a frame from the others: its turn (x) and the offset of its radii (y),
- * as shares of 2³². A turn alone does not do: the radii would stay where they are, and a few turns of one
- * spiral leave rings.
- *
- * BLUE takes the points of R2 (Roberts 2018: multiples of 1/g and 1/g², g³ = g + 1), which fill the square
- * of turns and offsets evenly from any point on. Frames follow each other, phases are sixteen points apart;
- * the order of phases is the one of which 2x2 neighbours err least together.
- * IGN is interleaved gradient noise (Jimenez 2014), a frame 5.588238 pixels on, for the offsets transposed.
- *
- * RMS error against sss_reference on two captured heads, beside that of WHITE. One frame: the same, but of
- * the means of 4x4 pixels 0.74 to 0.83 (BLUE), 0.83 to 0.86 (IGN). The mean of 8 frames: 0.80 to 0.84 (BLUE),
- * 1.2 to 1.3 (IGN); of 16 frames: 0.78 (BLUE), 1.1 to 1.3 (IGN). */
-static inline uint2 pattern_choice(int rotation, int seed, int number, int px, int py)
-{
-    const uint order[16] = {2, 3, 12, 6, 14, 8, 4, 10, 1, 11, 0, 5, 15, 7, 13, 9};
-    uint x = px, y = py, k = (uint)number + 16 * order[4 * py + px];
-    uint2 choice;
-    if (rotation == ROTATION_NONE)
-        return (uint2)(0, 0x80000000u);
-    if (rotation == ROTATION_WHITE)
-        return (uint2)(rl_hash((uint)seed, (uint)number, 4 * y + x, 1),
-                       rl_hash((uint)seed, (uint)number, 4 * y + x, 2));
-    if (rotation == ROTATION_IGN) { /* fractions of 2³²: 0.06711056, 0.00583715, their sum times 5.588238 */
-        uint frame = (uint)number * 1750839832u;
-        choice = (uint2)(288237660u * x + 25070368u * y, 25070368u * x + 288237660u * y) + frame;
-        choice = 52u * choice + mul_hi(choice, (uint2)(4221604530u)); /* 52.9829189 */
-    } else {
-        choice = (uint2)(2447445414u, 3242174889u) * k;
-    }
-    return choice + (uint2)(rl_hash((uint)seed, 0, 0, 1), rl_hash((uint)seed, 0, 0, 2));
-}
-
 /* Taps first…first+n-1, n <= TAP_BLOCK: index of the vector, radius² in units of d, weight, and for
- * weighting: surface and for the ledger how many pixels away, x before y. There are RL_W more indices behind the last, for
- * looking ahead. */
-static inline void place_taps(const inputs_t *in, const group_t *g, constant float *taps, int stride,
+ * weighting: surface and for the ledger how many pixels away, x before y. There are RL_W more indices behind
+ * the last, for looking ahead. */
+static inline void place_taps(const inputs_t *in, const group_t *g, global const float *taps, int stride,
                               int first, int n, int *at, float *r2, float *weight, int *shift)
 {
     const float magic = 12582912.0f;
@@ -150,23 +120,51 @@ static inline int pattern_count(int n)
     return fit > MOST_PATTERNS ? MOST_PATTERNS : (fit - 1) | 1;
 }
 
+static inline floatv weigh_channel(floatv exponent, floatv common)
+{
+    floatv e = weight_exp2(exponent);
+    return fma(e, e, (floatv)1.0f) * (e * common);
+}
+
 /* A tap's weights for the three channels, of the lanes in `counts`: `share` times R(sqrt(r2 + dz²)) without
  * its constant factors; lengths in units of the largest d. */
 static inline void weigh_tap(const group_t *g, floatv r2, floatv dz, floatv share, intv counts, floatv w[3])
 {
     floatv q = fma(dz, dz, r2), ir = rsqrt(q), r = q * ir;
     floatv common = scatter_keep(ir * share, counts);
-    for (int c = 0; c < 3; c++) {
-        floatv e = weight_exp2(r * g->fall[c]);
-        w[c] = fma(e, e, (floatv)1.0f) * (e * common);
-    }
+    w[0] = weigh_channel(r * g->fall[0], common); /* a loop is not unrolled, and goes through memory */
+    w[1] = weigh_channel(r * g->fall[1], common);
+    w[2] = weigh_channel(r * g->fall[2], common);
 }
 
-/* Weighted means of n taps, whose patterns start at `taps`; lanes without a sample keep what `out` holds. */
-static inline void sum_taps(const inputs_t *in, const group_t *g, constant float *taps, int n, floatv *out)
+/* From weights w and weighted light c to what one channel sends out, a pixel's `own` light given. Weights add
+ * up to another sum with each pattern; `share` is that sum beside the mean of all patterns, on a plane. The
+ * mean c/w leans to the own light of pixels, since c counts for more where w is small: with 21 taps of the
+ * widest profile alone, one thirty times narrower is off by 0.018 of stripes and 0.034 of grain; with those
+ * of the mixture by 0.003. Counting c/w for `share` and the own light for the rest, the quotient cancels on a
+ * plane: unbiased, and even light stays even everywhere. */
+static inline floatv settle(floatv own, floatv c, floatv w, float share)
+{
+    floatv v = fma((floatv)share, c / w - own, own);
+    return rl_select(own, fmax(v, fmin(own, 0.0f)), w > MIN_WEIGHT);
+}
+
+#if P_weighting == WEIGHTING_SURFACE
+/* What a curved surface sends out beside a flat one: of the weights there and on the tangent plane. */
+static inline floatv curve(const group_t *g, floatv w, floatv planar)
+{
+    return rl_select((floatv)1.0f, fma(g->plane.cosine, w / planar - 1.0f, (floatv)1.0f), w > MIN_WEIGHT);
+}
+#endif
+
+/* What n taps say, whose patterns start at `taps`, of the pixels' own light in `out`; lanes without a sample
+ * keep it. */
+static inline void sum_taps(const inputs_t *in, const group_t *g, global const float *taps, int n,
+                            floatv *out)
 {
     int stride = tap_stride(n), plane = in->f->plane4;
-    taps += 3 * stride * (int)mul_hi(g->spread, (uint)pattern_count(n));
+    taps += (3 * stride + 3) * (int)mul_hi(g->spread, (uint)pattern_count(n));
+    global const float *share = taps + 3 * stride;
     floatv w0 = 0.0f, w1 = 0.0f, w2 = 0.0f, c0 = 0.0f, c1 = 0.0f, c2 = 0.0f;
     int at[TAP_BLOCK + RL_W];
     float r2[TAP_BLOCK], weight[TAP_BLOCK];
@@ -189,20 +187,19 @@ static inline void sum_taps(const inputs_t *in, const group_t *g, constant float
             fetch_tap(in, at[i + AHEAD]);
             intv id = rl_as_intv(rl_vload(0, in->stencil + a)), same = id == g->material;
             floatv other = rl_vload(0, in->depth + a), dz = scatter_keep((other - g->z) * g->inv_d, same);
+            floatv stands = weight[i], e[3];
 #if P_weighting == WEIGHTING_SURFACE
             int x = shift[i], y = shift[TAP_BLOCK + i];
-            floatv flat = g->plane.x * (float)x + g->plane.y * (float)y, p[3];
+            floatv flat = g->plane.x * (float)x + g->plane.y * (float)y, plane_dz = flat * g->inv_d, p[3];
             intv away = scatter_turned_away(in, &g->v, x, y, id, other, g->z + flat);
-            floatv plane_dz = flat * g->inv_d;
             dz = rl_select(plane_dz, dz, same);
             weigh_tap(g, g->scale2 * r2[i], plane_dz, weight[i], same | away | g->keep, p);
             p0 += p[0];
             p1 += p[1];
             p2 += p[2];
 #endif
-            floatv share = weight[i], e[3];
-            AREA(share *= rl_select((floatv)1.0f, rl_vload(0, in->area + a) * per_own, same);)
-            weigh_tap(g, g->scale2 * r2[i], dz, share, same | g->keep, e);
+            AREA(stands *= rl_select((floatv)1.0f, rl_vload(0, in->area + a) * per_own, same);)
+            weigh_tap(g, g->scale2 * r2[i], dz, stands, same | g->keep, e);
             w0 += e[0];
             w1 += e[1];
             w2 += e[2];
@@ -212,24 +209,31 @@ static inline void sum_taps(const inputs_t *in, const group_t *g, constant float
 #if WANTS_energy
             weigh_tap(g, g->scale2 * r2[i], dz, weight[i], ~same, e);
             for (int c = 0; c < 3; c++)
-                scatter_reject(&rejected, c, e[c], scatter_inside(in->f, &g->v, shift[i], shift[TAP_BLOCK + i]));
+                scatter_reject(&rejected, c, e[c],
+                               scatter_inside(in->f, &g->v, shift[i], shift[TAP_BLOCK + i]));
 #endif
         }
     }
 #if WANTS_energy
     const floatv w[3] = {w0, w1, w2}, light[3] = {c0, c1, c2};
 #endif
+    out[0] = settle(out[0], c0, w0, share[0]);
+    out[1] = settle(out[1], c1, w1, share[1]);
+    out[2] = settle(out[2], c2, w2, share[2]);
 #if P_weighting == WEIGHTING_SURFACE
-    c0 *= fma(g->plane.cosine, w0 / p0 - 1.0f, (floatv)1.0f);
-    c1 *= fma(g->plane.cosine, w1 / p1 - 1.0f, (floatv)1.0f);
-    c2 *= fma(g->plane.cosine, w2 / p2 - 1.0f, (floatv)1.0f);
+    out[0] *= curve(g, w0, p0);
+    out[1] *= curve(g, w1, p1);
+    out[2] *= curve(g, w2, p2);
 #endif
-    out[0] = rl_select(out[0], c0 / w0, w0 > MIN_WEIGHT);
-    out[1] = rl_select(out[1], c1 / w1, w1 > MIN_WEIGHT);
-    out[2] = rl_select(out[2], c2 / w2, w2 > MIN_WEIGHT);
 #if WANTS_energy
-    for (int c = 0; c < 3; c++)
-        scatter_account(out, c, own[c], w[c], light[c], &rejected, g->keep, out[c], out[c], MIN_WEIGHT);
+    for (int c = 0; c < 3; c++) {
+        floatv raw = fma((floatv)share[c], light[c] / w[c] - own[c], own[c]); /* as settle() has it */
+#if P_weighting == WEIGHTING_SURFACE
+        raw *= fma(g->plane.cosine, w[c] / (c == 0 ? p0 : c == 1 ? p1 : p2) - 1.0f, (floatv)1.0f);
+#endif
+        raw = rl_select(out[c], raw, w[c] > MIN_WEIGHT);
+        scatter_account(out, c, own[c], share[c], w[c], light[c], &rejected, g->keep, raw, out[c], MIN_WEIGHT);
+    }
 #endif
 }
 
@@ -270,7 +274,7 @@ static inline void lay_disk(const inputs_t *in, group_t *g, intv now)
 
 /* The lanes `now` of the group, with the pattern that their size on screen asks for. */
 static inline void filter_group(const inputs_t *in, const group_t *g, constant params_t *p,
-                                constant float *taps, intv now, floatv *out)
+                                global const float *taps, intv now, floatv *out)
 {
     floatv sum[SCATTER_OUT];
     for (int c = 0; c < SCATTER_OUT; c++)
@@ -289,7 +293,7 @@ static inline void filter_group(const inputs_t *in, const group_t *g, constant p
         if (scatter_any(now & (many < 1.0f)))
             sum_taps(in, g, taps, TAPS_SOME, sum);
         if (scatter_any(now & (many > 0.0f)))
-            sum_taps(in, g, taps + 3 * TAP_BLOCK * MOST_PATTERNS, TAPS_MANY, fine);
+            sum_taps(in, g, taps + (3 * TAP_BLOCK + 3) * MOST_PATTERNS, TAPS_MANY, fine);
         for (int c = 0; c < SCATTER_OUT; c++) {
             sum[c] = fma(many, fine[c] - sum[c], sum[c]);
             sum[c] = fma(some, sum[c] - out[c], out[c]);
@@ -300,10 +304,11 @@ static inline void filter_group(const inputs_t *in, const group_t *g, constant p
 }
 
 static inline void filter_material(const inputs_t *in, const vector_t *v, constant params_t *p,
-                                   constant float *tables, int material, constant material_t *mat, intv mine,
-                                   floatv *out)
+                                   global const float *tables, int material, constant material_t *mat,
+                                   intv mine, floatv *out)
 {
     group_t g;
+    int start = (int)tables[TABLE_PATTERNS + material];
     constant float *d = mat->profile_scatter_distance_mm;
     float most = fmax(d[0], fmax(d[1], d[2]));
     g.v = *v;
@@ -334,11 +339,11 @@ static inline void filter_material(const inputs_t *in, const vector_t *v, consta
 #if P_orientation == ORIENTATION_TANGENT
         lay_disk(in, &g, now);
 #endif
-        filter_group(in, &g, p, tables + TABLE_TAPS, now, out);
+        filter_group(in, &g, p, tables + start, now, out);
     }
 }
 
-kernel void sss_burley_filter(SCATTER_PORTS, constant float *tables)
+kernel void sss_burley_filter(SCATTER_PORTS, global const float *tables)
 {
     inputs_t in = {diffuse, depth, area, stencil, f};
     vector_t v = scatter_vector(f);
@@ -362,18 +367,18 @@ kernel void sss_burley_filter(SCATTER_PORTS, constant float *tables)
 #endif
 }
 
-kernel void sss_burley_area(SCATTER_PORTS, constant float *tables)
+kernel void sss_burley_area(SCATTER_PORTS, global const float *tables)
 {
     AREA(scatter_area(depth, stencil, area, f);)
 }
 
-kernel void sss_burley_resolve(SCATTER_PORTS, constant float *tables)
+kernel void sss_burley_resolve(SCATTER_PORTS, global const float *tables)
 {
     scatter_resolve(filtered, lit, albedo, normal, stencil, color, f, materials);
 }
 
 #if WANTS_energy
-kernel void sss_burley_energy(SCATTER_PORTS, constant float *tables)
+kernel void sss_burley_energy(SCATTER_PORTS, global const float *tables)
 {
     SCATTER_ENERGY(RL_PHASE4);
 }

@@ -206,7 +206,7 @@ static inline void mean_along(int axis, const lanes_t *l, const gaussian_t *gaus
 #if WANTS_energy
     const floatv light[3] = {c0, c1, c2};
     for (int c = 0; c < 3; c++)
-        scatter_account(mean, c, rl_load(l->in.light, rl_index(f, l->x, l->y) + c * f->plane), w, light[c],
+        scatter_account(mean, c, rl_load(l->in.light, rl_index(f, l->x, l->y) + c * f->plane), 1.0f, w, light[c],
                         &rejected, l->keep, mean[c], mean[c], 0.0f);
 #endif
 }
@@ -380,7 +380,7 @@ static inline void mean_around(const lanes_t *l, constant material_t *mat, float
     for (int g = 0; g < mat->profile_gaussians_n; g++)
         for (int c = 0; c < 3; c++) {
             floatv one[SCATTER_OUT], mean = sum[3 * g + c] / w[g];
-            scatter_account(one, c, own[c], w[g], sum[3 * g + c], &rejected[g], l->keep, mean, mean, 0.0f);
+            scatter_account(one, c, own[c], 1.0f, w[g], sum[3 * g + c], &rejected[g], l->keep, mean, mean, 0.0f);
             for (int i = 3 + c; i < SCATTER_OUT; i += 3)
                 out[i] = fma((floatv)mat->profile_gaussians_weight[3 * g + c], one[i], out[i]);
         }

@@ -200,7 +200,7 @@ static inline void filter_material(const inputs_t *in, const vector_t *v, int ma
 #endif
         out[c] = rl_select(out[c], total.c[c] * over, mine & (total.w[c] > 0.0f));
 #if WANTS_energy
-        scatter_account(all, c, own, total.w[c], total.c[c], &total.rejected, at.keep, out[c], out[c], 0.0f);
+        scatter_account(all, c, own, 1.0f, total.w[c], total.c[c], &total.rejected, at.keep, out[c], out[c], 0.0f);
         for (int i = 3 + c; i < SCATTER_OUT; i += 3)
             out[i] = rl_select(out[i], all[i], mine);
 #endif

@@ -18,7 +18,7 @@ enum { POST, PRE_POST };
 enum { DISNEY, LAMBERT, SG };
 enum { GGX };
 enum { EXIT_IN_SSS, EXIT_IN_LIGHTING };
-enum { OPAQUE, THIN, THICK, BEER_LAMBERT };
+enum { OPAQUE, THIN, THICK, BEER_LAMBERT, GATHER }; /* GATHER: not in the lighting */
 enum { FROM_MAX, FROM_LAYER, FROM_SHADOW };
 
 /* Below this alpha a highlight of a light without size would be narrower than a pixel's worth of normals. */
@@ -33,7 +33,7 @@ typedef struct surface_t {
     floatv radius;           /* of curvature, metres; at most 1e6 */
     floatv bent[3][3];       /* the normal that each channel's scattering sees */
     sg_t sg[3];              /* of a material with SG, and the sharpness */
-    floatv sharpness[3];
+    floatv sharpness[3], blurred[3]; /* blurred: how far scattering counts, 0 where it is under a pixel */
 } surface_t;
 
 typedef struct ray_t {

@@ -7,6 +7,7 @@
 #define SLIDES          0.25f          /* pixels a frame: an edge that moves faster over what is behind it leaves it behind */
 #define MOST            5              /* of 9: a half plane that covers the middle leaves at most 4 */
 #define EDGE_FRAMES     4.0f           /* what history is worth at a moving edge: that of what turns is not where its surface was */
+#define RESAMPLED_FRAMES 6.0f          /* what history between pixels is worth: each frame resamples it again, and loses detail */
 #define COUNT_MAX       65536.0f       /* a frame's weight in a plain mean never gets below 1/COUNT_MAX */
 #define STILL           3.0f           /* the box is this much wider where nothing moves: jitter alone scatters colours */
 
@@ -36,15 +37,10 @@ static inline void find_place(constant frame_t *f, global const float *depth, gl
 {
     float m[12];
     int moved = camera_change(f, m);
-    floatv own = far_if_empty(rl_load(depth, rl_index(f, x, y))), best = own, last = own, ox = 0.0f, oy = 0.0f;
-    floatv near_dx = 0.0f, near_dy = 0.0f;
+    floatv own = far_if_empty(rl_load(depth, rl_index(f, x, y))), best = own, last = own, ratio = 1.0f, ignored[2];
     p->alone = (intv)-1;
     p->low = p->high = own;
-    p->dx = p->dy = 0.0f;
-#if HAS_motion
-    near_dx = p->dx = tap(motion, f, x, y);
-    near_dy = p->dy = tap(motion + f->plane, f, x, y);
-#endif
+    floatv own_dx = tap(motion, f, x, y), own_dy = tap(motion + f->plane, f, x, y), near_dx = own_dx, near_dy = own_dy;
     for (int i = 0; i < 9; i++) {
         int nx = x + i % 3 - 1, ny = y + i / 3 - 1;
         if (i == 4)
@@ -59,32 +55,17 @@ static inline void find_place(constant frame_t *f, global const float *depth, gl
         p->low = rl_select(p->low, fmin(p->low, z), mine);
         p->high = rl_select(p->high, fmax(p->high, z), mine);
 #endif
-#if HAS_motion
         near_dx = rl_select(near_dx, tap(motion, f, nx, ny), closer);
         near_dy = rl_select(near_dy, tap(motion + f->plane, f, nx, ny), closer);
-#else
-        ox = rl_select(ox, (floatv)(float)(i % 3 - 1), closer);
-        oy = rl_select(oy, (floatv)(float)(i / 3 - 1), closer);
-#endif
     }
     p->edge = last > best * (1.0f + DEPTH_TOLERANCE);
     p->alone &= ~p->edge;
     p->behind = best < own * (1.0f - DEPTH_TOLERANCE);
-    p->follows = 0;
-    floatv px = rl_to_floatv(RL_LANES + x), py = (float)y, ratio = 1.0f, own_dx = p->dx, own_dy = p->dy, ignored;
     if (moved)
-        follow(f, m, px, py, own, &own_dx, &own_dy, &ratio);
+        follow(f, m, rl_to_floatv(RL_LANES + x), (float)y, own, &ignored[0], &ignored[1], &ratio);
     p->then = rl_select(FAR, own * ratio, own < FAR);
     p->low *= ratio;
     p->high *= ratio;
-#if HAS_motion
-    own_dx = p->dx;
-    own_dy = p->dy;
-#else
-    if (!moved)
-        return;
-    follow(f, m, px + ox, py + oy, best, &near_dx, &near_dy, &ignored);
-#endif
     p->follows = p->behind & (fmax(fabs(near_dx - own_dx), fabs(near_dy - own_dy)) > SLIDES);
     p->dx = snap(rl_select(own_dx, near_dx, p->behind));
     p->dy = snap(rl_select(own_dy, near_dy, p->behind));
@@ -176,19 +157,10 @@ static inline uintv displacement_key(constant frame_t *f, int x, int y, floatv d
 }
 
 #if WANTS_energy
-#define TAA_LEDGER global float *clamped, global float *redistributed, global float *energy,
-#define TAA_PAST   6 /* the history's colour; for the ledger the same before it was clamped */
+#define TAA_PAST 6 /* the history's colour; for the ledger the same before it was clamped */
 #else
-#define TAA_LEDGER
 #define TAA_PAST 3
 #endif
-
-#define TAA_PORTS                                                                                            \
-    global const float *color, global const float *depth, global const float *motion,                        \
-        global const uint *stencil, global const float *last_color, global const float *last_depth,          \
-        global const uint *last_stencil, global const float *last_count, global float *out_color,            \
-        global float *out_count, TAA_LEDGER constant params_t *p, constant frame_t *f,                       \
-        constant material_t *materials
 
 kernel void taa(TAA_PORTS)
 {
@@ -208,7 +180,7 @@ kernel void taa(TAA_PORTS)
 #if HAS_stencil
         id = rl_load_id(stencil, at);
 #endif
-        find_place(f, depth, motion, stencil, x, y, id, &place);
+        find_place(f, depth, HAS_motion ? motion : moved, stencil, x, y, id, &place);
         floatv dx = place.dx, dy = place.dy;
         intv still = (dx == 0.0f) & (dy == 0.0f);
         colour_box(&box, f, color, own, x, y, rl_select(p->clip_gamma, STILL * p->clip_gamma, still));
@@ -225,7 +197,8 @@ kernel void taa(TAA_PORTS)
             mask &= ~((n < 0.0f) & (place.alone | (place.behind & ~place.follows)));
             if (!rl_any(mask))
                 continue;
-            n = rl_select(fabs(n), fmin(fabs(n), EDGE_FRAMES), place.edge & ~still);
+            n = rl_select(fabs(n), fmin(fabs(n), RESAMPLED_FRAMES), (tx != 0.0f) | (ty != 0.0f));
+            n = rl_select(n, fmin(n, EDGE_FRAMES), place.edge & ~still);
             if (whole)
                 for (int c = 0; c < 3; c++)
                     past[c] = tap(h.color + c * f->plane, f, hx, hy);

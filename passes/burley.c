@@ -42,6 +42,69 @@ void rl_burley_taps(size_t n, double offset, float *x, float *y, float *weight)
     }
 }
 
+/* Shares of the mixture, a channel. Channels as wide as the widest share what the narrow ones leave. */
+static void mixture_of(const double d[3], double share[3])
+{
+    int wide = 0, narrow = 0;
+    for (int c = 0; c < 3; c++)
+        narrow += d[c] < 1;
+    wide = 3 - narrow;
+    for (int c = 0; c < 3; c++)
+        share[c] = d[c] < 1 ? RL_BURLEY_NARROW : (1 - RL_BURLEY_NARROW * narrow) / wide;
+}
+
+static double mixture_cdf(double r, const double d[3], const double share[3])
+{
+    return share[0] * rl_burley_cdf(r, d[0]) + share[1] * rl_burley_cdf(r, d[1]) +
+           share[2] * rl_burley_cdf(r, d[2]);
+}
+
+/* R(r) r, times a factor that is the same for all d: finite at r = 0. */
+static double falloff(double r, double d)
+{
+    return (exp(-r / d) + exp(-r / (3 * d))) / d;
+}
+
+/* The radius in low … RL_BURLEY_RADIUS within which the mixture has xi: Newton's method, by halves where that
+ * leaves the bracket. */
+static double mixture_inverse(double xi, double low, const double d[3], const double share[3])
+{
+    double high = RL_BURLEY_RADIUS, r = low;
+    for (int i = 0; i < 100 && high - low > 1e-14 * high; i++) {
+        double miss = mixture_cdf(r, d, share) - xi, slope = 0;
+        *(miss < 0 ? &low : &high) = r;
+        for (int c = 0; c < 3; c++)
+            slope += 0.25 * share[c] * falloff(r, d[c]);
+        double next = r - miss / slope;
+        next = next > low && next < high ? next : 0.5 * (low + high);
+        if (fabs(next - r) <= 1e-14 * r)
+            break;
+        r = next;
+    }
+    return r;
+}
+
+void rl_burley_mixture_taps(size_t n, double offset, const double d[3], float *x, float *y, float *weight,
+                            double sum[3])
+{
+    const double golden = pi * (3 - sqrt(5.0));
+    double share[3], r = 0;
+    mixture_of(d, share);
+    double all = mixture_cdf(RL_BURLEY_RADIUS, d, share);
+    sum[0] = sum[1] = sum[2] = 0;
+    for (size_t i = 0; i < n; i++) {
+        double density = 0;
+        r = mixture_inverse(all * ((double)i + offset) / (double)n, r, d, share);
+        for (int c = 0; c < 3; c++)
+            density += share[c] * falloff(r, d[c]);
+        x[i] = (float)(r * cos((double)i * golden));
+        y[i] = (float)(r * sin((double)i * golden));
+        weight[i] = (float)(r / density);
+        for (int c = 0; c < 3; c++)
+            sum[c] += d[c] * falloff(r, d[c]) / density;
+    }
+}
+
 double rl_burley_scale(rl_burley_fit fit, double albedo)
 {
     double t = fit == RL_BURLEY_DMFP ? albedo - 0.33 : fabs(albedo - 0.8);
@@ -104,6 +167,19 @@ const rl_form rl_scatter_forms[RL_SCATTER_FORMS] = {
      "d = l_d/s, s = 3.5 + 100 (A - 0.33)^4",
      "Unreal, BurleyNormalizedSSSCommon.ush (with its Enable Mean Free Path: mean_free_path, of "
      "l/0.6); " PAPER "eq. 8"},
+};
+
+const rl_port rl_scatter_ports[RL_SCATTER_PORTS] = {
+    {"diffuse", RL_READ, RL_RGB, .help = "radiance below the surface", .layout = RL_PHASE4},
+    {"lit", RL_READ, RL_RGB, .help = "radiance that does not scatter"},
+    {"albedo", RL_READ, RL_RGB, .help = "0..1"},
+    {"normal", RL_READ, RL_NORMAL, .help = "shading normal, for the way out"},
+    {"depth", RL_READ, RL_SCALAR, .help = "planar, metres", .layout = RL_PHASE4},
+    {"stencil", RL_READ, RL_ID, .help = "material", .layout = RL_PHASE4},
+    {"area", RL_SCRATCH, RL_SCALAR, .help = "surface that a pixel sees", .layout = RL_PHASE4},
+    {"filtered", RL_SCRATCH, RL_RGB, .help = "scattered radiance below the surface", .layout = RL_PHASE4},
+    {"color", RL_WRITE, RL_RGB, .help = "radiance, scene-linear"},
+    RL_SCATTER_LEDGER(RL_PHASE4),
 };
 
 const rl_param rl_scatter_profile_rows[RL_SCATTER_PROFILE_ROWS] = {

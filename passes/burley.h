@@ -37,6 +37,19 @@ double rl_burley_inverse(double xi);
  * all taps. With ½ each tap is in the middle of its share; other offsets fill the gaps between those. */
 void rl_burley_taps(size_t n, double offset, float *x, float *y, float *weight);
 
+/* The same for a material whose channels have different d[0…2] > 0, in units of the largest. Taps that are
+ * placed for the widest channel alone hardly ever come near the middle of one that is thirty times narrower.
+ * So they are placed by the mixture of the channels' profiles: RL_BURLEY_NARROW of it for each channel that
+ * is narrower than the widest, the rest for the widest; i's radius has (i + offset)/n of what the mixture has
+ * within RL_BURLEY_RADIUS. weight[i] is 1/density of the mixture, up to a factor that is the same for all
+ * taps and offsets, so R times it is the balance heuristic (Veach 1997). No channel's is more than 1/0.02 in
+ * the middle, however narrow.
+ * sum[c] is what the n weights of channel c add up to on a plane that faces the camera, in the same units for
+ * all offsets. */
+#define RL_BURLEY_NARROW 0.02
+void rl_burley_mixture_taps(size_t n, double offset, const double d[3], float *x, float *y, float *weight,
+                            double sum[3]);
+
 /* s(A), A in 0 … 1 the reflectance of the surface, in d = l/s: fits to Monte Carlo renderings of a flat half
  * space with index-matched, isotropic scattering. */
 typedef enum rl_burley_fit {
@@ -46,13 +59,26 @@ typedef enum rl_burley_fit {
 } rl_burley_fit;
 double rl_burley_scale(rl_burley_fit fit, double albedo);
 
-/* The rows that the passes share; identical rows in several passes are one field of the material table. */
+/* Ports of the passes that filter with a disk of pixels (kernels/scatter.cl), and the rows that they share:
+ * identical rows in several passes are one field of the material table. */
+#define RL_SCATTER_PORTS        14
 #define RL_SCATTER_PROFILE_ROWS 8
 #define RL_SCATTER_SHADING_ROWS 2
+extern const rl_port rl_scatter_ports[RL_SCATTER_PORTS];
 extern const rl_param
     rl_scatter_profile_rows[RL_SCATTER_PROFILE_ROWS]; /* scatter_distance_mm texturing border, and what the
                                                          first may be derived from */
 extern const rl_param rl_scatter_shading_rows[RL_SCATTER_SHADING_ROWS]; /* diffuse exit_transmission */
+
+/* Rows of their parameters. */
+#define RL_ROW_ORIENTATION(struct_)                                                                          \
+    P_ENUM(struct_, orientation, "screen|tangent", 0,                                                        \
+           "the disk is parallel to the screen, or to the tangent plane that the depth gives",               \
+           .structural = true)
+#define RL_ROW_WEIGHTING(struct_)                                                                            \
+    P_ENUM(struct_, weighting, "area|plain|surface", 0,                                                      \
+           "a sample stands for the area that its pixel sees, its pixel, or area over the tangent plane's",  \
+           .structural = true)
 
 #ifdef __cplusplus
 }

@@ -33,8 +33,7 @@ static const rl_param profile_keys[] = {
     RL_ROW_SCATTER_DISTANCE(.required_with = "transmission=thin|thick"),
     RL_ROWS_SCATTER_PARAM,
     RL_ROW_TEXTURING,
-    M_ENUM(transmission, "none|thin|thick|beer_lambert", 0, "light that comes through from the back face",
-           .source = "Golubev 2018; Helix"),
+    RL_ROW_TRANSMISSION,
     M_ENUM(thickness_from, "max|layer|shadow", 0,
            "thick, beer_lambert: the thickness layer, shadow_thickness along the normal, or the larger",
            .source = "Golubev 2018"),
@@ -52,9 +51,7 @@ static const rl_param material_keys[] = {
       .no_default = true),
     M(RL_F32, specular, 0, 1, -1, "ratio",
       "reflectance at normal incidence; not given: the specular layer, else 0.04", .no_default = true),
-    M(RL_F32, metallic, 0, 1, -1, "ratio",
-      "1: albedo is the specular colour and nothing is diffuse; not given: the metallic layer, else 0",
-      .no_default = true),
+    RL_ROW_METALLIC,
     M(RL_F32, normal_detail_mm, 0, 1e4, 3, "mm",
       "diffuse: sg: size of the bumps that smooth_normal leaves out, as a standard deviation",
       .source = "d'Eon and Luebke 2007; MJP"),
@@ -63,7 +60,7 @@ static const rl_param material_keys[] = {
 static const rl_param shading_keys[] = {
     RL_ROW_DIFFUSE,
     M_ENUM(specular, "ggx|none", 0, "the specular lobe", .source = "Walter 2007, Heitz 2014"),
-    M(RL_BOOL, transmission, 0, 1, 1, "", "false switches off the transmission that profiles ask for"),
+    RL_ROW_TRANSMIT,
     RL_ROW_EXIT_TRANSMISSION,
 };
 

@@ -46,6 +46,16 @@ extern const rl_form rl_scatter_forms[RL_SCATTER_FORMS];
     M_ENUM(exit_transmission, "sss|lighting", 0,                                                             \
            "where the way out is applied: behind the filter, or before it as in the talk",                   \
            .source = "Golubev 2018")
+#define RL_ROW_TRANSMISSION                                                                                  \
+    M_ENUM(transmission, "none|thin|thick|beer_lambert|gather", 0,                                           \
+           "light from the back face: guessed in the lighting, or gathered by pass translucency",            \
+           .source = "Golubev 2018; Helix")
+#define RL_ROW_TRANSMIT                                                                                      \
+    M(RL_BOOL, transmission, 0, 1, 1, "", "false switches off the transmission that profiles ask for")
+#define RL_ROW_METALLIC                                                                                      \
+    M(RL_F32, metallic, 0, 1, -1, "ratio",                                                                   \
+      "1: albedo is the specular colour and nothing is diffuse; not given: the metallic layer, else 0",      \
+      .no_default = true)
 
 /* The ports that scattering filters have for the ledger of energy; layout_ is that of what they filter. */
 #define RL_SCATTER_LEDGER(layout_)                                                                           \

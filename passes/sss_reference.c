@@ -9,27 +9,10 @@ typedef struct sss_reference_params {
 } sss_reference_params;
 
 static const rl_param params[] = {
-    P_ENUM(sss_reference_params, orientation, "screen|tangent", 0,
-           "the disk is parallel to the screen, or to the tangent plane that the depth gives",
-           .structural = true),
-    P_ENUM(sss_reference_params, weighting, "area|plain|surface", 0,
-           "a sample stands for the area that its pixel sees, its pixel, or area over the tangent plane's",
-           .structural = true),
+    RL_ROW_ORIENTATION(sss_reference_params),
+    RL_ROW_WEIGHTING(sss_reference_params),
 };
 RL_PARAMS_MATCH(sss_reference_params, 2);
-
-static const rl_port ports[] = {
-    {"diffuse", RL_READ, RL_RGB, .help = "radiance below the surface", .layout = RL_PHASE4},
-    {"lit", RL_READ, RL_RGB, .help = "radiance that does not scatter"},
-    {"albedo", RL_READ, RL_RGB, .help = "0..1"},
-    {"normal", RL_READ, RL_NORMAL, .help = "shading normal, for the way out"},
-    {"depth", RL_READ, RL_SCALAR, .help = "planar, metres", .layout = RL_PHASE4},
-    {"stencil", RL_READ, RL_ID, .help = "material", .layout = RL_PHASE4},
-    {"area", RL_SCRATCH, RL_SCALAR, .help = "surface that a pixel sees", .layout = RL_PHASE4},
-    {"filtered", RL_SCRATCH, RL_RGB, .help = "scattered radiance below the surface", .layout = RL_PHASE4},
-    {"color", RL_WRITE, RL_RGB, .help = "radiance, scene-linear"},
-    RL_SCATTER_LEDGER(RL_PHASE4),
-};
 
 static const rl_step steps[] = {
     {"sss_reference_area", .domain = RL_EVERY_PHASE},
@@ -55,7 +38,7 @@ const rl_pass rl_pass_sss_reference = {
     .params_size = sizeof(sss_reference_params),
     .profile_keys = RL_ARRAY(rl_scatter_profile_rows),
     .shading_keys = RL_ARRAY(rl_scatter_shading_rows),
-    .ports = RL_ARRAY(ports),
+    .ports = RL_ARRAY(rl_scatter_ports),
     .steps = RL_ARRAY(steps),
     .conserves = true,
     .cost = cost,

@@ -1,7 +1,8 @@
 /* Temporal anti-aliasing: reproject the history, reject it where it shows something else, clip it to the
  * colours around the pixel, blend. Static, jittered frames with blend 0 add up to their plain mean.
  *
- * Variance clipping: Salvi 2016. Closest motion, luminance weights: Karis 2014. Survey of the rest: Yang et
+ * Variance clipping: Salvi 2016. Closest motion, luminance weights: Karis 2014. Motion without a layer, by
+ * tiles: Lucas and Kanade 1981. Survey of the rest: Yang et
  * al. 2020. */
 #include "graph/model/pass.h"
 #include "passes/shading_rows.h"
@@ -26,12 +27,14 @@ static const rl_port ports[] = {
     {"depth", RL_READ, RL_SCALAR, .help = "planar, metres"},
     {"motion", RL_READ, RL_VEC2, .help = "pixels to the same point one frame before; else depth and cameras",
      .optional = true,
-     .if_absent = "motion comes from depth and the cameras, which do not know of what moves by itself"},
+     .if_absent = "motion comes from depth and the cameras, that of what moves by itself from a search"},
     {"stencil", RL_READ, RL_ID, .help = "material, to reject history of another", .optional = true},
     {"last_color", RL_HISTORY, RL_RGB, .of = "color", .help = "the previous result"},
     {"last_depth", RL_HISTORY, RL_SCALAR, .of = "depth", .help = "the previous depth"},
     {"last_stencil", RL_HISTORY, RL_ID, .of = "stencil", .help = "the previous materials", .optional = true},
     {"last_count", RL_HISTORY, RL_SCALAR, .of = "count", .help = "frames in the previous result"},
+    {"moved", RL_SCRATCH, RL_VEC2, .help = "motion as depth, cameras and colours show it",
+     .without = "motion"},
     {"color", RL_WRITE, RL_RGB, .help = "anti-aliased, scene-linear"},
     {"count", RL_WRITE, RL_SCALAR,
      .help = "frames in the pixel, this one included; negative: it follows an edge in front"},
@@ -41,6 +44,7 @@ static const rl_port ports[] = {
 };
 
 static const rl_step steps[] = {
+    {"taa_motion", .domain = RL_EVERY_VECTOR, .without = "motion"},
     {"taa", .domain = RL_EVERY_VECTOR},
     {"taa_energy", .domain = RL_EVERY_BAND, .with = "energy"},
 };
@@ -59,9 +63,9 @@ static double cost(const void *of)
 const rl_pass rl_pass_taa = {
     .name = "taa",
     .help = "temporal anti-aliasing with variance clipping",
-    .source = "Salvi 2016; Karis 2014; Yang et al. 2020",
+    .source = "Salvi 2016; Karis 2014; Lucas and Kanade 1981; Yang et al. 2020",
     .kernel = "taa.cl",
-    .kernel_prelude = "energy.cl temporal.cl",
+    .kernel_prelude = "energy.cl temporal.cl taa_motion.cl",
     .params = RL_ARRAY(params),
     .params_size = sizeof(taa_params),
     .ports = RL_ARRAY(ports),

@@ -233,14 +233,18 @@ static bool print_rim(accuracy_scene *s, float *color)
         return true;
     printf("\n| rim light from behind, error, %% (bias, %%) | R | G | B |\n| --- | --- | --- | --- |\n");
     for (size_t i = 0; i < 3; i++) {
-        bool more = true;
+        bool more = true, gathered = false;
         for (size_t k = 0; more; k++) { /* 0: no transmission */
             accuracy_model model = {.settled = i == 2};
             double error[3], bias[3];
             snprintf(model.sss, sizeof model.sss, "%s", passes[i][1]);
             more = k == 0 || word_at(from, k - 1, model.thickness, sizeof model.thickness);
-            if (!more)
+            if (!more && (!s->has_back || gathered))
                 continue;
+            if (!more) { /* behind the last word: the gather */
+                snprintf(model.thickness, sizeof model.thickness, "%s", ACCURACY_GATHER);
+                gathered = more = true;
+            }
             if (!accuracy_render(s, &model, ACCURACY_RIM, color))
                 return false;
             snprintf(model.name, sizeof model.name, "rim %s %s", passes[i][0], k ? model.thickness : "none");

@@ -89,6 +89,10 @@ static const char manifest_head[] =
     "  stencil: {channels: [stencil.ID]}\n"
     "  thickness: {channels: [thickness.T]}\n";
 
+static const char manifest_back[] = "  back_depth: {channels: [back_depth.Z], kind: planar, empty: 1e10}\n"
+                                    "  back_normal: {channels: [back_normal.X, back_normal.Y, "
+                                    "back_normal.Z], space: world, encoding: signed}\n";
+
 /* A manifest that shows the one frame under ACCURACY_FRAMES numbers; NULL when it cannot be written. */
 static const char *write_manifest(accuracy_scene *s, accuracy_lit lit, double unit)
 {
@@ -97,6 +101,8 @@ static const char *write_manifest(accuracy_scene *s, accuracy_lit lit, double un
     rl_error err = {0};
     const char *path = rl_arena_printf(&s->arena, "%s/%s.yaml", s->out, lit ? "rim" : "main");
     rl_str_add(&text, manifest_head);
+    if (s->has_back)
+        rl_str_add(&text, manifest_back);
     for (size_t k = 0; path && k < 2; k++) {
         const char *comma = "";
         rl_str_printf(&text, "  %s: {", layers[k]);
@@ -128,15 +134,21 @@ static const char *write_manifest(accuracy_scene *s, accuracy_lit lit, double un
     return code ? NULL : path;
 }
 
-enum { SETTINGS = 5 + 4 * ACCURACY_MATERIALS };
+enum { SETTINGS = 7 + 4 * ACCURACY_MATERIALS };
 
 /* What the model changes in configs/accuracy.yaml. Returns the number of settings. */
 static size_t choose(accuracy_scene *s, const accuracy_model *model, rl_setting *to)
 {
     rl_arena *a = &s->arena;
+    const bool gather = !strcmp(model->thickness, ACCURACY_GATHER);
     size_t n = 0;
-    to[n++] = (rl_setting){
-        "graph.sss", rl_arena_printf(a, "{%s, in: {diffuse: light.diffuse, lit: light.lit}}", model->sss)};
+    to[n++] = (rl_setting){"graph.sss", rl_arena_printf(a, "{%s, in: {diffuse: light.diffuse, lit: %s.lit}}",
+                                                        model->sss, gather ? "through" : "light")};
+    if (gather) {
+        to[n++] = (rl_setting){"graph.behind", "{pass: back_lighting}"};
+        to[n++] =
+            (rl_setting){"graph.through", "{pass: translucency, in: {back: behind.diffuse, lit: light.lit}}"};
+    }
     to[n++] = (rl_setting){"shading.diffuse", model->shading[0] ? model->shading : "lambert"};
     to[n++] = (rl_setting){"shading.transmission", model->thickness[0] ? "true" : "false"};
     if (!strcmp(model->shading, "sg")) {
@@ -153,8 +165,10 @@ static size_t choose(accuracy_scene *s, const accuracy_model *model, rl_setting 
                                rl_arena_printf(a, "{profile: %s}", profile)};
         to[n++] = (rl_setting){rl_arena_printf(a, "profiles.%s.scatter_distance_mm", profile),
                                rl_arena_printf(a, "[%.9g, %.9g, %.9g]", m->d_mm[0], m->d_mm[1], m->d_mm[2])};
-        if (model->thickness[0]) {
-            to[n++] = (rl_setting){rl_arena_printf(a, "profiles.%s.transmission", profile), "thick"};
+        if (model->thickness[0])
+            to[n++] = (rl_setting){rl_arena_printf(a, "profiles.%s.transmission", profile),
+                                   gather ? "gather" : "thick"};
+        if (model->thickness[0] && !gather) {
             to[n++] =
                 (rl_setting){rl_arena_printf(a, "profiles.%s.thickness_from", profile), model->thickness};
         }
@@ -324,6 +338,18 @@ static bool read_render(accuracy_scene *s, const char *name, bool required, rl_i
     return true;
 }
 
+/* Whether the G-buffer has back faces. */
+static bool find_back(accuracy_scene *s)
+{
+    rl_image_file file = {0};
+    rl_error err = {0};
+    if (rl_image_file_read(s->frame, &file, &err))
+        return failed(&err);
+    s->has_back = strstr(file.names, "back_depth.Z") && strstr(file.names, "back_normal.X");
+    rl_image_file_free(&file);
+    return true;
+}
+
 bool accuracy_scene_open(accuracy_scene *s, const char *folder, const char *out)
 {
     rl_error err = {0};
@@ -332,7 +358,7 @@ bool accuracy_scene_open(accuracy_scene *s, const char *folder, const char *out)
     s->out = out;
     if (rl_folder_make(out, &err))
         return failed(&err);
-    return read_notes(s) && read_render(s, "ref_clay_burley.exr", true, &s->truth) &&
+    return read_notes(s) && find_back(s) && read_render(s, "ref_clay_burley.exr", true, &s->truth) &&
            read_render(s, "ref_clay_burley_rim.exr", false, &s->rim_truth) &&
            read_render(s, "gt_clay_lambert_rim.exr", false, &s->rim_lambert) && make_masks(s);
 }

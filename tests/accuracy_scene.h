@@ -53,10 +53,13 @@ typedef struct accuracy_scene {
                        edge */
     uint8_t *ear;   /* pixels that the rim light reaches from behind only */
     int *id;        /* of the material */
+    bool has_back;  /* the G-buffer has the layers back_depth (.Z) and back_normal (.X .Y .Z) */
 } accuracy_scene;
 
 bool accuracy_scene_open(accuracy_scene *s, const char *folder, const char *out);
 void accuracy_scene_close(accuracy_scene *s);
+
+#define ACCURACY_GATHER "gather" /* screen-space translucency, of a scene that has_back */
 
 /* A model: the text of graph.sss without its inputs, and what else to set. */
 typedef struct accuracy_model {
@@ -64,7 +67,7 @@ typedef struct accuracy_model {
     char sss[160];      /* "pass: sss_burley, taps: 55" */
     char shading[32];   /* shading.diffuse, "" = lambert */
     const char *set;    /* of profiles: NAME_set is used for material NAME; NULL = NAME itself */
-    char thickness[16]; /* thickness_from of thick transmission, "" = none */
+    char thickness[16]; /* thickness_from of thick transmission, ACCURACY_GATHER, "" = none */
     double unit;        /* metres a unit of the capture's lengths; 0 = 1 */
     bool settled;       /* ACCURACY_FRAMES frames of TAA, not one frame */
 } accuracy_model;

@@ -102,11 +102,13 @@ static void scene_free(scene *s)
         rl_free(planes[i]);
 }
 
-static double run_ours(cl_session *session, const scene *s, int taps, int repeat, float *color)
+enum { AREA = 0, PLAIN = 1, SURFACE = 2 };
+
+static double run_ours(cl_session *session, const scene *s, int taps, int weighting, int repeat, float *color)
 {
     const struct {
         int32_t taps, orientation, weighting, rotation, seed;
-    } params = {taps, 0, 1, 3, 0};
+    } params = {taps, 0, weighting, 3, 0};
     const cl_image images[] = {{"diffuse", s->diffuse, NULL}, {"lit", s->lit, NULL},
                                {"albedo", s->albedo, NULL},   {"normal", s->normal, NULL},
                                {"depth", s->depth, NULL},     {"stencil", s->stencil, NULL},
@@ -185,6 +187,22 @@ static double noise(const scene *s, const float *color)
     return sqrt(sum / (double)n);
 }
 
+/* What the weightings cost, as multiples of `plain`. */
+static bool print_weightings(cl_session *session, const scene *s, int taps)
+{
+    double best[3] = {1e30, 1e30, 1e30};
+    for (int round = 0; round < 5; round++)
+        for (int k = 0; k < 3; k++) {
+            double ms = run_ours(session, s, taps, k, REPEAT, s->ours);
+            if (ms < 0)
+                return false;
+            best[k] = fmin(best[k], ms);
+        }
+    printf("  %d taps: area %.1f ms, plain %.1f ms, surface %.1f ms; surface takes %.2f times area\n", taps,
+           best[AREA], best[PLAIN], best[SURFACE], best[SURFACE] / best[AREA]);
+    return true;
+}
+
 int main(void)
 {
     static const float focal[] = {900, 5800}; /* pixels; radius about 60 and 380 pixels for skin */
@@ -193,14 +211,14 @@ int main(void)
     cl_session *session = cl_open(0);
     scene s = {0};
     for (size_t f = 0; session && f < 2; f++) {
-        if (!scene_make(&s, focal[f]) || run_ours(session, &s, 4096, 1, s.truth) < 0)
+        if (!scene_make(&s, focal[f]) || run_ours(session, &s, 4096, PLAIN, 1, s.truth) < 0)
             goto done;
         printf("%dx%d, %.1f %% subsurface, radius %.0f px (skin)\n", WIDTH, HEIGHT, 100 * s.coverage,
                RL_BURLEY_RADIUS * 0.003 * (double)focal[f] / 0.65);
         for (size_t t = 0; t < 2; t++) {
             double ours = 1e30, talk = 1e30;
             for (int round = 0; round < 3; round++) { /* in turns, as the machine's speed drifts */
-                double a = run_ours(session, &s, taps[t], REPEAT, s.ours),
+                double a = run_ours(session, &s, taps[t], PLAIN, REPEAT, s.ours),
                        b = run_talk(session, &s, taps[t], 2);
                 if (a < 0 || b < 0)
                     goto done;
@@ -209,6 +227,8 @@ int main(void)
             }
             printf("  %d taps: sss_burley %.1f ms, talk %.1f ms, ratio %.1f; noise %.2e and %.2e\n", taps[t],
                    ours, talk, talk / ours, noise(&s, s.ours), noise(&s, s.talk));
+            if (!print_weightings(session, &s, taps[t]))
+                goto done;
         }
         scene_free(&s);
         memset(&s, 0, sizeof s);

@@ -10,6 +10,7 @@
 
 #include "graph/base/alloc.h"
 #include "graph/base/text.h"
+#include "graph/model/materials.h"
 #include "graph/model/params.h"
 
 #define KEPT    32
@@ -216,6 +217,22 @@ static cl_program build(cl_session *s, const char *text)
     return program;
 }
 
+bool cl_read_materials(const cl_job *job, rl_arena *arena, rl_materials *m)
+{
+    const rl_registry alone = {&job->pass, 1};
+    *m = (rl_materials){.data = job->materials};
+    if (rl_material_rows(arena, &alone, &m->rows, &m->n_rows, &m->entry_bytes, NULL) != RL_OK)
+        return false;
+    m->count = job->materials_bytes / m->entry_bytes;
+    m->profiles = rl_arena_array(arena, m->count, sizeof *m->profiles);
+    for (size_t i = 0; m->profiles && i < m->count; i++) {
+        int32_t has;
+        memcpy(&has, (const char *)m->data + i * m->entry_bytes, sizeof has);
+        m->profiles[i] = has ? "profile" : NULL;
+    }
+    return m->profiles != NULL;
+}
+
 /* ---- running ---- */
 
 typedef struct cl_args {
@@ -322,7 +339,10 @@ bool cl_run(cl_session *s, const cl_job *job)
     }
     if (ok && pass->tables) {
         rl_error err = {0};
-        ok = pass->tables(&(rl_pass_input){.params = job->params}, &arena, &tables, &err) == RL_OK;
+        rl_materials materials;
+        ok = cl_read_materials(job, &arena, &materials) &&
+             pass->tables(&(rl_pass_input){.params = job->params, .materials = &materials}, &arena, &tables,
+                          &err) == RL_OK;
     }
     ok = ok && (!pass->params.n || add_buffer(s, &args, (void *)(uintptr_t)job->params, pass->params_size));
     ok = ok && add_buffer(s, &args, &frame, sizeof frame);

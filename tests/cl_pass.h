@@ -7,6 +7,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "graph/model/materials.h"
 #include "graph/model/pass.h"
 #include "kernels/shared.h"
 
@@ -46,6 +47,9 @@ typedef struct cl_job {
 } cl_job;
 
 bool cl_run(cl_session *s, const cl_job *job);
+
+/* The job's materials as the host's side of the pass reads them, made in the arena. */
+bool cl_read_materials(const cl_job *job, rl_arena *arena, rl_materials *m);
 
 /* A program of its own, for peers: source text, entry point, `n` buffers (bytes each; read back when
  * `write`), global and local size. Milliseconds of the fastest of `repeat` runs; negative on failure. */

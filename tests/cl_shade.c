@@ -8,6 +8,7 @@
 #include "graph/base/alloc.h"
 #include "graph/base/file.h"
 #include "graph/base/text.h"
+#include "graph/model/params.h"
 #include "tests/cl_shade.h"
 #include "tests/cl_shade_parts.h"
 
@@ -164,9 +165,8 @@ static bool add_buffer(launch *l, const void *data, size_t bytes)
     if (data)
         buffer = clCreateBuffer(context, CL_MEM_READ_WRITE | CL_MEM_COPY_HOST_PTR, bytes,
                                 (void *)(uintptr_t)data, &bad);
-    l->buffers[l->n] = buffer;
-    return bad == CL_SUCCESS &&
-           clSetKernelArg(l->kernel, l->n++, sizeof(cl_mem), data ? &buffer : NULL) == CL_SUCCESS;
+    l->buffers[l->n++] = buffer;
+    return bad == CL_SUCCESS;
 }
 
 /* Ports are sub-buffers behind their guard, as in the executor. */
@@ -183,8 +183,16 @@ static bool add_port(launch *l, const frame_t *f, const shade_image *image)
     cl_buffer_region region = {RL_GUARD * sizeof(float), bytes - RL_GUARD * sizeof(float)};
     cl_mem buffer = clCreateSubBuffer(whole, CL_MEM_READ_WRITE, CL_BUFFER_CREATE_TYPE_REGION, &region, &bad);
     clReleaseMemObject(whole); /* lives on in the sub-buffer */
-    l->buffers[l->n] = buffer;
-    return bad == CL_SUCCESS && clSetKernelArg(l->kernel, l->n++, sizeof(cl_mem), &buffer) == CL_SUCCESS;
+    l->buffers[l->n++] = buffer;
+    return bad == CL_SUCCESS;
+}
+
+static bool set_arguments(const launch *l)
+{
+    bool ok = true;
+    for (cl_uint i = 0; i < l->n && ok; i++)
+        ok = clSetKernelArg(l->kernel, i, sizeof(cl_mem), &l->buffers[i]) == CL_SUCCESS;
+    return ok;
 }
 
 static void free_launch(launch *l)
@@ -250,11 +258,13 @@ static bool dispatch(launch *l, shade_run *run, rl_domain domain)
 {
     const frame_t *f = &run->frame;
     size_t width = (size_t)lanes_of(run);
-    size_t size[2] = {(size_t)f->columns / (domain == RL_EVERY_VECTOR ? width : 1), (size_t)f->rows};
+    bool vectors = domain == RL_EVERY_VECTOR;
+    size_t size[2] = {(size_t)f->columns / (vectors ? width : 1), (size_t)f->rows};
+    size_t local[2] = {vectors ? 4 : 64, 1}; /* as the executor: items of a group keep their state at once */
     run->best_ms = 1e30;
     for (int i = 0; i <= run->repeat; i++) {
         double start = now_ms();
-        if (clEnqueueNDRangeKernel(queue, l->kernel, 2, NULL, size, NULL, 0, NULL, NULL) != CL_SUCCESS)
+        if (clEnqueueNDRangeKernel(queue, l->kernel, 2, NULL, size, local, 0, NULL, NULL) != CL_SUCCESS)
             return false;
         if (clFinish(queue) != CL_SUCCESS)
             return false;
@@ -279,13 +289,32 @@ static bool read_back(launch *l, const shade_run *run)
     return true;
 }
 
+/* Whether the run has no image for the port of that name. */
+static bool is_without(const shade_run *run, const char *port)
+{
+    for (size_t i = 0; port && i < run->pass->ports.n; i++)
+        if (!strcmp(run->pass->ports.rows[i].name, port))
+            return !run->images[i];
+    return true;
+}
+
+static bool run_step(launch *l, shade_run *run, const rl_step *step)
+{
+    cl_int bad = 0;
+    l->kernel = clCreateKernel(l->program, step->entry, &bad);
+    bool ok = l->kernel && set_arguments(l) && dispatch(l, run, step->domain);
+    if (l->kernel)
+        clReleaseKernel(l->kernel);
+    l->kernel = NULL;
+    return ok;
+}
+
 bool shade_execute(shade_run *run)
 {
     bool ok = false;
     char path[256];
     rl_str text = {0};
     launch l = {0};
-    cl_int bad = 0;
     snprintf(path, sizeof path, "kernels/%s", run->pass->kernel);
     add_prelude(&text, run);
     if (!shade_device() || !add_file(&text, "kernels/shared.h") || !add_file(&text, "kernels/common.cl") ||
@@ -294,9 +323,13 @@ bool shade_execute(shade_run *run)
     l.program = build(rl_str_text(&text), lanes_of(run));
     if (!l.program)
         goto done;
-    l.kernel = clCreateKernel(l.program, run->pass->steps.rows[0].entry, &bad);
-    ok = l.kernel && add_arguments(&l, run) && dispatch(&l, run, run->pass->steps.rows[0].domain) &&
-         read_back(&l, run);
+    ok = add_arguments(&l, run);
+    for (size_t i = 0; i < run->pass->steps.n && ok; i++) {
+        const rl_step *step = &run->pass->steps.rows[i];
+        if (rl_step_runs(run->pass, step, params_of(run)) && is_without(run, step->without) && !step->with)
+            ok = run_step(&l, run, step);
+    }
+    ok = ok && read_back(&l, run);
     if (!ok)
         fprintf(stderr, "%s: cannot run\n", run->pass->name);
 done:
@@ -319,7 +352,8 @@ bool shade_function(const char *source, const char *entry, const float *in, floa
     if (!l.program)
         goto done;
     l.kernel = clCreateKernel(l.program, entry, &bad);
-    if (bad || !add_buffer(&l, in, n * sizeof *in) || !add_buffer(&l, out, n * sizeof *out))
+    if (bad || !add_buffer(&l, in, n * sizeof *in) || !add_buffer(&l, out, n * sizeof *out) ||
+        !set_arguments(&l))
         goto done;
     ok = clEnqueueNDRangeKernel(queue, l.kernel, 1, NULL, &(size_t){n / 16}, NULL, 0, NULL, NULL) ==
              CL_SUCCESS &&

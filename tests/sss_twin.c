@@ -2,10 +2,9 @@
 #include "tests/sss_twin.h"
 
 #include <math.h>
-#include <string.h>
 
-#include "graph/base/alloc.h"
 #include "passes/burley.h"
+#include "tests/sss_patterns.h"
 
 static const double pi = 3.14159265358979323846;
 
@@ -305,15 +304,6 @@ static void choice_of(const twin_scene *s, int x, int y, int seed, double choice
     }
 }
 
-/* An odd number, at most 15, of patterns that are padded to 64 taps and have 4096 together. */
-static int patterns_of(int n)
-{
-    int most = 4096 / ((n + 63) / 64 * 64);
-    if (most > 15)
-        most = 15;
-    return most % 2 ? most : most - 1;
-}
-
 void twin_burley(const twin_scene *s, int x, int y, int n, int seed, double filtered[3])
 {
     const camera_t *c = &s->frame.camera;
@@ -325,16 +315,19 @@ void twin_burley(const twin_scene *s, int x, int y, int n, int seed, double filt
     float less = slope2 > 0 ? (1.0f / sqrtf(1.0f + slope2) - 1.0f) / slope2 : 0;
     float xx = less * t[0] * t[0], xy = less * t[0] * t[1], yy = less * t[1] * t[1];
     float kx = c->focal[0] / (middle * inv_d), ky = c->focal[1] / (middle * inv_d);
-    double choice[2], offset;
+    double choice[2];
     choice_of(s, x, y, seed, choice);
-    offset = (floor(choice[1] * patterns_of(n)) + 0.5) / patterns_of(n);
     float co = (float)cos(2 * pi * floor(choice[0] * 256) / 256),
           si = (float)sin(2 * pi * floor(choice[0] * 256) / 256);
     double z = s->depth[at(s, x, y)], scale = z / middle, own = twin_area(s, x, y), sum[3] = {0},
            weights[3] = {0}, planar[3] = {0};
     tangent_t tangent = tangent_of(s, x, y);
-    float *tx = rl_malloc((size_t)n * 12), *ty = tx + n, *tw = ty + n;
-    rl_burley_taps((size_t)n, offset, tx, ty, tw);
+    double proportions[3] = {(double)d[0] / most, (double)d[1] / most, (double)d[2] / most};
+    const patterns_t *patterns = patterns_for(n, proportions);
+    int pattern = (int)floor(choice[1] * patterns->count);
+    const float *tx = patterns->x + pattern * n, *ty = patterns->y + pattern * n,
+                *tw = patterns->weight + pattern * n;
+    const double *share = patterns->share[pattern];
     for (int i = 0; i < n; i++) {
         float u = fmaf(tx[i], co, -(ty[i] * si)), v = fmaf(tx[i], si, ty[i] * co);
         float x_disk = u;
@@ -360,8 +353,11 @@ void twin_burley(const twin_scene *s, int x, int y, int n, int seed, double filt
         }
     }
     for (int k = 0; k < 3; k++) {
-        double over = (1 - tangent.cosine) / weights[k] + (s->surface ? tangent.cosine / planar[k] : 0);
-        filtered[k] = weights[k] > 1e-12 ? sum[k] * over : s->diffuse[k * plane(s) + at(s, x, y)];
+        double own_light = s->diffuse[k * plane(s) + at(s, x, y)], v = own_light;
+        if (weights[k] > 1e-12) {
+            v = fmax(v + share[k] * (sum[k] / weights[k] - v), fmin(v, 0));
+            v *= s->surface ? 1 - tangent.cosine + tangent.cosine * weights[k] / planar[k] : 1;
+        }
+        filtered[k] = v;
     }
-    rl_free(tx);
 }

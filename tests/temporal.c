@@ -61,7 +61,10 @@ static const struct {
     {"camera_no_motion", false, {.width = 192, .height = 108, .camera_moves = true}},
     {"object", true, {.width = 192, .height = 108, .object_moves = true}},
     {"object_no_motion", false, {.width = 192, .height = 108, .object_moves = true}},
+    {"both_no_motion", false, {.width = 192, .height = 108, .camera_moves = true, .object_moves = true}},
     {"both", true, {.width = 192, .height = 108, .camera_moves = true, .object_moves = true}},
+    {"fine", true, {.width = 192, .height = 108, .camera_moves = true, .density = 1.3}},
+    {"plain_no_motion", false, {.width = 192, .height = 108, .object_moves = true, .plain = true}},
     {"plain", true, {.width = 192, .height = 108, .object_moves = true, .plain = true}},
 };
 

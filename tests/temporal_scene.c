@@ -136,6 +136,7 @@ static double texture(double u, double v, int channel)
 
 static void shade(const temporal_scene *s, const hit *h, double *rgb)
 {
+    double finer = s->density > 0 ? s->density : 1;
     double u = h->world[0] / texel, v = h->world[1] / texel;
     if (h->id == SCENE_SPHERE) {
         u = 400 + atan2(h->local[0], h->local[2]) * radius / texel;
@@ -145,8 +146,8 @@ static void shade(const temporal_scene *s, const hit *h, double *rgb)
         if (h->id == SCENE_PLANE && s->plain)
             rgb[c] = 0.2 + 0.0004 * (u + 100) + 0.03 * c;
         else
-            rgb[c] =
-                texture(u, v, h->id == SCENE_SPHERE ? 2 - c : c) + (h->id == SCENE_SPHERE ? 0.08 : -0.05);
+            rgb[c] = texture(u * finer, v * finer, h->id == SCENE_SPHERE ? 2 - c : c) +
+                     (h->id == SCENE_SPHERE ? 0.08 : -0.05);
     }
 }
 

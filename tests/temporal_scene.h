@@ -15,6 +15,7 @@ typedef struct temporal_scene {
     bool camera_moves; /* drifts, comes closer and turns: one to two pixels a frame */
     bool object_moves; /* the sphere goes right by 2.3 pixels a frame and spins */
     bool plain;        /* the plane has a smooth gradient and no texture */
+    double density;    /* of the textures' detail, 0 = 1: their shortest wave is 4 pixels at 1 */
 } temporal_scene;
 
 /* A recorded frame: width * height samples a plane. */

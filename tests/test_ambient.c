@@ -139,6 +139,7 @@ static void make_yard(yard *t, uint64_t seed)
         }
     }
     t->scene.frame.lights = 0;
+    t->scene.frame.camera.focal[0] = 5000; /* a pixel of 0.3 mm: nothing is too small to scatter */
     t->run = shade_scene_lighting(&t->scene);
     t->run.images[LIGHTING_SMOOTH_NORMAL] = NULL;
     t->run.ambient = &t->ambient;

@@ -122,6 +122,47 @@ static void taps_follow_profile(void **state)
     assert_true(hypot(mean_x, mean_y) < 0.02); /* no side is preferred */
 }
 
+/* Of three channels: the radii fill the mixture evenly, weights are 1/density, and sums what they say. All
+ * offsets together have the integral of each channel's profile. */
+static void mixed_taps_follow_mixture(void **state)
+{
+    (void)state;
+    enum { N = 200, OFFSETS = 40 };
+    static const double sets[][3] = {{1, 0.4, 0.23}, {0.03, 1, 0.03}, {1, 1, 0.001}, {1, 1, 1}};
+    static float x[N], y[N], w[N];
+    for (size_t k = 0; k < 4; k++) {
+        const double *d = sets[k];
+        double share[3], all = 0, mean[3] = {0}, sum[3], narrow = 0;
+        for (int c = 0; c < 3; c++)
+            narrow += d[c] < 1 ? RL_BURLEY_NARROW : 0;
+        for (int c = 0; c < 3; c++)
+            share[c] = d[c] < 1 ? RL_BURLEY_NARROW : (1 - narrow) / ((d[0] == 1) + (d[1] == 1) + (d[2] == 1));
+        for (int c = 0; c < 3; c++)
+            all += share[c] * rl_burley_cdf(RL_BURLEY_RADIUS, d[c]);
+        for (int j = 0; j < OFFSETS; j++) {
+            double want[3] = {0};
+            rl_burley_mixture_taps(N, (j + 0.5) / OFFSETS, d, x, y, w, sum);
+            for (int i = 0; i < N; i++) {
+                double r = hypot(x[i], y[i]), within = 0, density = 0;
+                for (int c = 0; c < 3; c++) {
+                    within += share[c] * rl_burley_cdf(r, d[c]);
+                    density += share[c] * rl_burley_profile(r, d[c]) * 8 * 3.14159265358979323846;
+                }
+                assert_true(fabs(within - all * (i + (j + 0.5) / OFFSETS) / N) < 1e-6);
+                assert_true(fabs(w[i] * density - 1) < 1e-5);
+                for (int c = 0; c < 3; c++)
+                    want[c] += rl_burley_profile(r, d[c]) * 8 * 3.14159265358979323846 * d[c] * w[i];
+            }
+            for (int c = 0; c < 3; c++) {
+                assert_true(fabs(sum[c] / want[c] - 1) < 1e-4);
+                mean[c] += sum[c] * all / (d[c] * N * OFFSETS);
+            }
+        }
+        for (int c = 0; c < 3; c++)
+            assert_true(fabs(mean[c] - rl_burley_cdf(RL_BURLEY_RADIUS, d[c])) < 1e-4);
+    }
+}
+
 static void rows_are_usable(void **state)
 {
     (void)state;
@@ -136,9 +177,10 @@ static void rows_are_usable(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(inverse_equals_bisection), cmocka_unit_test(inverse_equals_halley),
-        cmocka_unit_test(inverse_has_ends),         cmocka_unit_test(cdf_integrates_profile),
-        cmocka_unit_test(taps_follow_profile),      cmocka_unit_test(rows_are_usable),
+        cmocka_unit_test(inverse_equals_bisection),  cmocka_unit_test(inverse_equals_halley),
+        cmocka_unit_test(inverse_has_ends),          cmocka_unit_test(cdf_integrates_profile),
+        cmocka_unit_test(mixed_taps_follow_mixture), cmocka_unit_test(taps_follow_profile),
+        cmocka_unit_test(rows_are_usable),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

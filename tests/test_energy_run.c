@@ -35,7 +35,6 @@ static const struct {
     {"tangent", {{"graph.sss.orientation", "tangent"}, {"graph.sss.taps", "auto"}}, 2},
     {"occlude", {{"profiles.skin.border", "occlude"}, {"graph.sss.weighting", "plain"}}, 2},
     {"dense", {PASS("sss_reference")}, 2},
-    {"around", {PASS("sss_reference"), {"graph.sss.weighting", "surface"}}, 3},
     {"lines", {PASS("sss_gaussian"), {"profiles.skin.gaussians", GAUSSIANS}}, 3},
     {"disk",
      {PASS("sss_gaussian"), {"profiles.skin.gaussians", GAUSSIANS}, {"graph.sss.separable", "false"}},

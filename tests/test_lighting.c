@@ -62,7 +62,9 @@ static void optional_layers_may_be_missing(void **state)
             if (port == absent || absent > LIGHTING_EMISSION)
                 run.images[port] = NULL;
         assert_true(shade_execute(&run));
-        assert_true(against_twin(&run) < 1e-5);
+        double worst = against_twin(&run);
+        assert_true(worst <
+                    2e-5); /* where scattering fades out, ten times what its radius in pixels is off */
     }
     shade_scene_free(&s);
 }

@@ -228,6 +228,15 @@ static size_t make_arguments(const form *f, rl_memory **args)
     return n + extra;
 }
 
+/* Whether the form feeds the port of that name. */
+static bool feeds(const form *f, const char *port)
+{
+    for (size_t i = 0; port && i < f->pass->ports.n; i++)
+        if (!strcmp(f->pass->ports.rows[i].name, port))
+            return f->buffers[i] >= 0;
+    return false;
+}
+
 static void run_form(const form *f, const char *what)
 {
     rl_memory *args[MOST_PORTS + 5] = {0};
@@ -236,7 +245,7 @@ static void run_form(const form *f, const char *what)
     rl_error err = {0};
     for (size_t s = 0; s < f->pass->steps.n; s++) {
         if (!rl_step_runs(f->pass, &f->pass->steps.rows[s], f->params) ||
-            !has_reduction(f, f->pass->steps.rows[s].with))
+            !has_reduction(f, f->pass->steps.rows[s].with) || feeds(f, f->pass->steps.rows[s].without))
             continue;
         rl_dispatch d = {
             .entry = f->pass->steps.rows[s].entry, .arguments = args, .n_arguments = n, .dims = 3};

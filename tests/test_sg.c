@@ -314,6 +314,60 @@ static void own_shadow_is_none(void **state)
     shade_scene_free(&b.scene);
 }
 
+/* The ball with 33 normals, a column each; `lit` gets the middle row. */
+static void shade_columns(ball *b, double px, bool scatters, double lit[3][33])
+{
+    const frame_t *f = &b->scene.frame;
+    b->run.frame.camera.focal[0] = (float)px;
+    b->scene.materials.words[b->material][0] = scatters;
+    assert_true(shade_execute(&b->run));
+    for (int c = 0; c < 3; c++)
+        for (int x = 0; x < 33; x++)
+            lit[c][x] = *shade_at(&b->scene.images[LIGHTING_LIT], f, c, x, 4);
+}
+
+/* From so far away that Burley's filter of that variance is under half a pixel nothing scatters, as with the
+ * other models: what comes out is Lambert's, on any curvature, at the terminator and with bumps, from lights
+ * and from the sky. A little nearer it is the Gaussian. */
+static void far_away_is_the_unfiltered_surface(void **state)
+{
+    ball b;
+    ambient_t sky = {.on = 1, .lobes = 1, .lobe = {{{0.6f, 0, 0.8f}, 30, {0.1f, 0.1f, 0.1f}}}};
+    double bare[3][33], lit[3][33], worst = 0, near = 0;
+    (void)state;
+    make_ball(&b);
+    for (int i = 0; i < 27; i++)
+        sky.sh[i] = i < 3 ? 0.3f : 0.03f;
+    shade_material_set(&b.scene.materials, b.material, "profile", "sg_variance_mm2",
+                       (double[]){100, 100, 100});
+    b.run.images[LIGHTING_SMOOTH_NORMAL] = &b.scene.images[LIGHTING_SMOOTH_NORMAL];
+    b.run.ambient = &sky;
+    set_layer(&b, LIGHTING_SMOOTH_NORMAL, 0, 0, 1);
+    for (int x = 0; x < 33; x++)
+        for (int i = 0; i < 3; i++) {
+            double turn = (x - 16) * 0.15;
+            *shade_at(&b.scene.images[LIGHTING_NORMAL], &b.scene.frame, i, x, 4) =
+                (float)(i == 0   ? sin(turn)
+                        : i == 1 ? 0
+                                 : cos(turn));
+        }
+    /* 0.445 pixels, 1 m away, and 0.56 */
+    double pixels = 1000 / (16.5644 * sqrt(100.0 / 7));
+    shade_columns(&b, 0.445 * pixels, false, bare);
+    shade_columns(&b, 0.445 * pixels, true, lit);
+    for (int i = 0; i < 3 * 33; i++)
+        worst = fmax(worst, fabs(lit[i / 33][i % 33] / bare[i / 33][i % 33] - 1));
+    shade_columns(&b, 0.56 * pixels, false, bare);
+    shade_columns(&b, 0.56 * pixels, true, lit);
+    for (int i = 0; i < 3 * 33; i++)
+        near = fmax(near, fabs(lit[i / 33][i % 33] / bare[i / 33][i % 33] - 1));
+    print_message("far away: largest difference to no scattering %.2g %%, nearer %.0f %%\n", 100 * worst,
+                  100 * near);
+    assert_true(worst < 0.005);
+    assert_true(near > 0.2);
+    shade_scene_free(&b.scene);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -324,6 +378,7 @@ int main(void)
         cmocka_unit_test(variance_defaults_to_that_of_burley),
         cmocka_unit_test(normals_soften_a_channel_at_a_time),
         cmocka_unit_test(own_shadow_is_none),
+        cmocka_unit_test(far_away_is_the_unfiltered_surface),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

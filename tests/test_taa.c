@@ -23,7 +23,7 @@ typedef struct taa_case {
 
 static void make_case(taa_case *t, int w, int h, int x0, int y0)
 {
-    static const int planes[TAA_PORTS] = {3, 1, 2, 1, 3, 1, 1, 1, 3, 1};
+    static const int planes[TAA_PORTS] = {3, 1, 2, 1, 3, 1, 1, 1, 2, 3, 1};
     memset(t, 0, sizeof *t);
     t->run = (shade_run){.pass = &rl_pass_taa, .frame = shade_frame(w, h, x0, y0)};
     shade_params_default(&rl_pass_taa, &t->params);

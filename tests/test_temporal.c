@@ -10,6 +10,7 @@
 #include <string.h>
 #include <cmocka.h>
 
+#include "graph/run/camera.h"
 #include "tests/temporal_run.h"
 
 static void run_on(const temporal_scene *scene, bool motion, int frames, int compared, temporal_report *r)
@@ -65,16 +66,19 @@ static void print(const char *what, const temporal_report *r)
                   r->raw_psnr, r->psnr, r->p95, r->disoccluded, r->disoccluded_difference);
 }
 
-/* With exact motion; with motion withheld as well where nothing but the camera moves. */
+/* With exact motion, and with motion withheld, where that of the object has to be found. */
 static void moving_frames_approach_the_truth(void **state)
 {
     static const struct {
         const char *name;
         bool camera, object, motion;
-    } cases[] = {{"camera moves", true, false, true},
-                 {"camera moves, no motion layer", true, false, false},
-                 {"object moves", false, true, true},
-                 {"both move", true, true, true}};
+        double p95;
+    } cases[] = {{"camera moves", true, false, true, 0.03},
+                 {"camera moves, no motion layer", true, false, false, 0.03},
+                 {"object moves", false, true, true, 0.03},
+                 {"object moves, no motion layer", false, true, false, 0.03},
+                 {"both move", true, true, true, 0.03},
+                 {"both move, no motion layer", true, true, false, 0.032}};
     (void)state;
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         temporal_report r;
@@ -83,29 +87,29 @@ static void moving_frames_approach_the_truth(void **state)
         run_on(&scene, cases[i].motion, 16, 2, &r);
         print(cases[i].name, &r);
         assert_true(r.psnr >= r.raw_psnr + 5);
-        assert_true(r.p95 <= 0.03);
+        assert_true(r.p95 <= cases[i].p95);
         assert_true(!cases[i].object || r.disoccluded > 0);
         assert_true(r.disoccluded_difference == 0);
         temporal_report_free(&r);
     }
 }
 
-/* What moves by itself cannot be followed without a motion layer; what it uncovers must still be fresh. */
-static void withheld_motion_uncovers_afresh(void **state)
+/* Textures whose shortest wave is 3 pixels: what resampling loses adds up, unless history counts for less. */
+static void fine_detail_survives_motion(void **state)
 {
     temporal_report r;
-    const temporal_scene scene = {.width = 192, .height = 108, .camera_moves = true, .object_moves = true};
+    const temporal_scene scene = {.width = 192, .height = 108, .camera_moves = true, .density = 1.3};
     (void)state;
-    run_on(&scene, false, 12, 1, &r);
-    print("both move, no motion layer", &r);
-    assert_true(r.disoccluded > 0);
-    assert_true(r.disoccluded_difference == 0);
-    assert_true(r.psnr > r.raw_psnr);
+    run_on(&scene, true, 16, 1, &r);
+    print("fine detail, camera moves", &r);
+    assert_true(r.psnr >= r.raw_psnr + 8);
+    assert_true(r.p95 <= 0.031); /* 0.034 without the cap */
     temporal_report_free(&r);
 }
 
-/* In front of a plain wall every trail would show. Without motion vectors an object's edge may drag along the
- * two pixels next to it, since jitter alone could have put them on its other side. */
+/* In front of a plain wall every trail would show. The motion that is found is off by a part of a pixel at
+ * the outline, where a tile holds little of the object: the pixel next to it is as good as a sample, and all
+ * is better in the mean. */
 static void no_trail_behind_an_edge(void **state)
 {
     temporal_report r;
@@ -119,6 +123,7 @@ static void no_trail_behind_an_edge(void **state)
     print_message("no motion layer: 3 to 8 pixels behind %.5f, a sample %.5f\n", r.far_behind,
                   r.far_behind_raw);
     assert_true(r.far_behind <= r.far_behind_raw);
+    assert_true(r.psnr > r.raw_psnr + 1);
     temporal_report_free(&r);
 }
 
@@ -189,11 +194,35 @@ static void camera_jumps_end_history(void **state)
     begin(&s, 70, 40, "", NULL, NULL);
     assert_int_equal(step(&s, 1, 0, 0), 1);
     assert_int_equal(step(&s, 2, 0.001, 0), 2); /* a drift is none */
-    assert_int_equal(step(&s, 3, 0.001, 0.01), 3);
-    assert_int_equal(step(&s, 4, 0.001, 0.6), 1); /* 34 degrees */
-    assert_int_equal(step(&s, 5, 0.001, 0.6), 2);
-    assert_int_equal(step(&s, 6, 11, 0.6), 1); /* 11 metres */
+    assert_int_equal(step(&s, 3, 0.001, 0.001), 3);
+    assert_int_equal(step(&s, 4, 0.001, 0.601), 1); /* 34 degrees */
+    assert_int_equal(step(&s, 5, 0.001, 0.601), 2);
+    assert_int_equal(step(&s, 6, 3, 0.601), 1); /* 3 metres, past all that is seen, 2 metres away */
     end(&s);
+}
+
+/* How far a jump is depends on how far away things are. */
+static void jumps_are_a_matter_of_scale(void **state)
+{
+    float depth[32 * 32];
+    const rl_depth_view view = {depth, 32, 0, 0, 32, 32};
+    camera_t a = {.to_view = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0},
+                  .to_world = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0},
+                  .focal = {32, 32},
+                  .centre = {16, 16}};
+    camera_t b = a;
+    (void)state;
+    b.to_view[3] = -0.5f; /* half a metre to the right */
+    b.to_world[3] = 0.5f;
+    for (int scale = 0; scale < 3; scale++) {
+        for (int i = 0; i < 32 * 32; i++)
+            depth[i] = (float[]){0.4f, 1, 100}[scale];
+        double seen = rl_camera_share_seen(&b, &a, &view);
+        assert_true(fabs(seen - (double[]){0, 0.5, 1}[scale]) < 0.07);
+        assert_true(rl_camera_share_seen(&a, &a, &view) == 1);
+    }
+    memset(depth, 0, sizeof depth);
+    assert_true(rl_camera_share_seen(&b, &a, &view) == 1);
 }
 
 /* Another size: history is empty, and works again from there. */
@@ -283,10 +312,11 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(still_frames_reach_the_truth),    cmocka_unit_test(moving_frames_approach_the_truth),
-        cmocka_unit_test(withheld_motion_uncovers_afresh), cmocka_unit_test(no_trail_behind_an_edge),
+        cmocka_unit_test(fine_detail_survives_motion),     cmocka_unit_test(no_trail_behind_an_edge),
         cmocka_unit_test(gaps_and_cuts_end_history),       cmocka_unit_test(camera_jumps_end_history),
-        cmocka_unit_test(another_size_ends_history),       cmocka_unit_test(excluded_materials_stay_current),
-        cmocka_unit_test(unknown_materials_are_errors),    cmocka_unit_test(missing_motion_is_said_once),
+        cmocka_unit_test(jumps_are_a_matter_of_scale),     cmocka_unit_test(another_size_ends_history),
+        cmocka_unit_test(excluded_materials_stay_current), cmocka_unit_test(unknown_materials_are_errors),
+        cmocka_unit_test(missing_motion_is_said_once),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

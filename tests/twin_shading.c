@@ -180,13 +180,15 @@ static double scattered(const twin_material *m, const twin_pixel *p, int channel
 {
     double v = m->variance_mm2[channel], n[3],
            u = m->detail_mm * m->detail_mm + p->pixel_mm * p->pixel_mm / 12;
-    double keep = p->has_smooth ? u / (u + v) : 1, r_mm = 1000 / fmax(fabs(p->curvature), 1e-6);
+    double blurred = fmin(fmax(10 * (16.5644 * sqrt(v / 7) / p->pixel_mm - 0.45), 0), 1);
+    double keep = p->has_smooth ? 1 - blurred * v / (u + v) : 1, r_mm = 1000 / fmax(fabs(p->curvature), 1e-6);
     for (int i = 0; i < 3; i++)
         n[i] = p->smooth[i] + keep * (p->n[i] - p->smooth[i]);
-    double length = fmax(sqrt(dot(n, n)), 1e-6), lambda = fmin(fmax(r_mm * r_mm / v, 1e-3), 1e4);
+    double bare = shadow * fmax(nl, 0), length = fmax(sqrt(dot(n, n)), 1e-6),
+           lambda = fmin(fmax(r_mm * r_mm / v, 1e-3), 1e4);
     if (shadow_thickness && *shadow_thickness > 0 && *shadow_thickness <= 4e-3 * r_mm * fmax(-nl, 0) + 1e-3)
         shadow = 1;
-    return shadow * twin_sg_irradiance(lambda, dot(n, l) / length);
+    return (1 - blurred) * bare + blurred * shadow * twin_sg_irradiance(lambda, dot(n, l) / length);
 }
 
 static void add_light(const shade_run *run, const light_t *light, const twin_material *m, const twin_pixel *p,

@@ -11,24 +11,23 @@ static int clamp_to(int x, int low, int high)
     return x < low ? low : x > high ? high : x;
 }
 
-/* The nearest pixel inside. */
-static double tap(const shade_run *run, int port, int plane, int x, int y)
+double twin_tap(const shade_run *run, int port, int plane, int x, int y)
 {
     const frame_t *f = &run->frame;
     return *shade_at(run->images[port], f, plane, clamp_to(x, f->valid[0], f->valid[2] - 1),
                      clamp_to(y, f->valid[1], f->valid[3] - 1));
 }
 
-static uint32_t tap_id(const shade_run *run, int port, int x, int y)
+uint32_t twin_tap_id(const shade_run *run, int port, int x, int y)
 {
     const frame_t *f = &run->frame;
     return shade_id(run->images[port], f, clamp_to(x, f->valid[0], f->valid[2] - 1),
                     clamp_to(y, f->valid[1], f->valid[3] - 1));
 }
 
-static double depth_at(const shade_run *run, int port, int x, int y)
+double twin_depth(const shade_run *run, int port, int x, int y)
 {
-    double z = tap(run, port, 0, x, y);
+    double z = twin_tap(run, port, 0, x, y);
     return z > 0 ? z : far_depth;
 }
 
@@ -48,7 +47,7 @@ static double clip(const shade_run *run, int x, int y, bool still, double *past)
     for (int i = 0; i < 9; i++) {
         double rgb[3];
         for (int c = 0; c < 3; c++)
-            rgb[c] = tap(run, TAA_COLOR, c, x + i % 3 - 1, y + i / 3 - 1);
+            rgb[c] = twin_tap(run, TAA_COLOR, c, x + i % 3 - 1, y + i / 3 - 1);
         to_ycocg(rgb, v[i]);
         brightest = i == 4 ? brightest : fmax(brightest, v[i][0]);
     }
@@ -79,8 +78,7 @@ static double weight(const double *rgb, double brightest)
     return 1 / (1 + fmax(v[0] - 2 * brightest, 0));
 }
 
-/* Displacement and previous depth by the cameras, for the sample of pixel (x, y) at depth z. */
-static void follow(const frame_t *f, int x, int y, double z, double *d, double *then)
+void twin_follow(const frame_t *f, int x, int y, double z, double *d, double *then)
 {
     const camera_t *a = &f->camera, *b = &f->previous;
     double view[3], world[3], p[3];
@@ -113,19 +111,20 @@ static double snap(double d)
 
 static place find_place(const shade_run *run, int x, int y)
 {
-    double own = depth_at(run, TAA_DEPTH, x, y);
+    double own = twin_depth(run, TAA_DEPTH, x, y);
     place p = {.alone = true, .low = own, .high = own};
-    double best = own, last = own, ignored, mine[2], front[2];
+    double best = own, last = own, mine[2], front[2];
+    int motion = run->images[TAA_MOTION] ? TAA_MOTION : TAA_MOVED;
     int at = 4;
     for (int i = 0; i < 9; i++) {
         int nx = x + i % 3 - 1, ny = y + i / 3 - 1;
-        double z = depth_at(run, TAA_DEPTH, nx, ny);
+        double z = twin_depth(run, TAA_DEPTH, nx, ny);
         at = z < best ? i : at;
         best = fmin(best, z);
         last = fmax(last, z);
         if (!run->images[TAA_STENCIL])
             continue;
-        bool same = tap_id(run, TAA_STENCIL, nx, ny) == tap_id(run, TAA_STENCIL, x, y);
+        bool same = twin_tap_id(run, TAA_STENCIL, nx, ny) == twin_tap_id(run, TAA_STENCIL, x, y);
         p.alone = p.alone && same;
         p.low = same ? fmin(p.low, z) : p.low;
         p.high = same ? fmax(p.high, z) : p.high;
@@ -134,13 +133,12 @@ static place find_place(const shade_run *run, int x, int y)
     p.alone = p.alone && !p.edge;
     p.behind = best < own * 0.98;
     int nx = x + at % 3 - 1, ny = y + at / 3 - 1;
-    follow(&run->frame, x, y, own, mine, &p.then);
-    follow(&run->frame, nx, ny, best, front, &ignored);
+    twin_follow(&run->frame, x, y, own, mine, &p.then);
     p.low *= p.then / own;
     p.high *= p.then / own;
-    for (int i = 0; i < 2 && run->images[TAA_MOTION]; i++) {
-        mine[i] = tap(run, TAA_MOTION, i, x, y);
-        front[i] = tap(run, TAA_MOTION, i, nx, ny);
+    for (int i = 0; i < 2; i++) {
+        mine[i] = twin_tap(run, motion, i, x, y);
+        front[i] = twin_tap(run, motion, i, nx, ny);
     }
     p.follows = p.behind && fmax(fabs(front[0] - mine[0]), fabs(front[1] - mine[1])) > 0.25;
     for (int i = 0; i < 2; i++)
@@ -157,8 +155,8 @@ static bool shows(const shade_run *run, int x, int y, double px, double py, uint
     int same = 0;
     for (int i = 0; i < 9; i++) {
         int nx = x + i % 3 - 1, ny = y + i / 3 - 1;
-        double t = depth_at(run, TAA_LAST_DEPTH, nx, ny);
-        if (run->images[TAA_STENCIL] && tap_id(run, TAA_LAST_STENCIL, nx, ny) != id)
+        double t = twin_depth(run, TAA_LAST_DEPTH, nx, ny);
+        if (run->images[TAA_STENCIL] && twin_tap_id(run, TAA_LAST_STENCIL, nx, ny) != id)
             continue;
         same += fabs(t - z) <= 0.04 * z;
         if (p->alone && i == 4 && fabs(t - z) <= 0.04 * z)
@@ -166,8 +164,8 @@ static bool shows(const shade_run *run, int x, int y, double px, double py, uint
     }
     for (int j = (int)floor(py) - 1; j <= (int)ceil(py) + 1; j++) {
         for (int i = (int)floor(px) - 1; i <= (int)ceil(px) + 1; i++) {
-            double t = depth_at(run, TAA_LAST_DEPTH, i, j);
-            if (run->images[TAA_STENCIL] && tap_id(run, TAA_LAST_STENCIL, i, j) != id)
+            double t = twin_depth(run, TAA_LAST_DEPTH, i, j);
+            if (run->images[TAA_STENCIL] && twin_tap_id(run, TAA_LAST_STENCIL, i, j) != id)
                 continue;
             low = fmin(low, t);
             high = fmax(high, t);
@@ -192,10 +190,10 @@ static double resample(const shade_run *run, int plane, double x, double y)
     int ix = (int)floor(x), iy = (int)floor(y);
     double sum = 0, least = 0;
     if (x == ix && y == iy)
-        return tap(run, TAA_LAST_COLOR, plane, ix, iy);
+        return twin_tap(run, TAA_LAST_COLOR, plane, ix, iy);
     for (int j = iy - 2; j <= iy + 3; j++) {
         for (int i = ix - 2; i <= ix + 3; i++) {
-            double v = tap(run, TAA_LAST_COLOR, plane, i, j);
+            double v = twin_tap(run, TAA_LAST_COLOR, plane, i, j);
             sum += v * kernel_weight(x - i) * kernel_weight(y - j);
             least = fmin(least, v);
         }
@@ -222,10 +220,11 @@ void twin_taa(const shade_run *run, int x, int y, double *out)
     uint32_t id = run->images[TAA_STENCIL] ? shade_id(run->images[TAA_STENCIL], f, x, y) : 0;
     if (p->exclude[id / 32] >> id % 32 & 1)
         return;
-    double n = tap(run, TAA_LAST_COUNT, 0, nx, ny);
+    double n = twin_tap(run, TAA_LAST_COUNT, 0, nx, ny);
     if (!shows(run, nx, ny, px, py, id, &at) || (n < 0 && (at.alone || (at.behind && !at.follows))))
         return;
-    n = at.edge && !at.still ? fmin(fabs(n), 4) : fabs(n);
+    n = at.d[0] != floor(at.d[0]) || at.d[1] != floor(at.d[1]) ? fmin(fabs(n), 6) : fabs(n);
+    n = at.edge && !at.still ? fmin(n, 4) : n;
     for (int c = 0; c < 3; c++)
         past[c] = resample(run, c, px, py);
     double alpha = fmax(1 / (1 + n), p->blend), brightest = clip(run, x, y, at.still, past);

@@ -77,8 +77,9 @@ rl_code rl_graph_build(rl_arena *arena, const rl_node *nodes, size_t n_nodes, co
                        size_t n_layers, const rl_wanted *wanted, size_t n_wanted, const rl_graph **out,
                        rl_error *err);
 
-/* Fails where a material needs an optional port (rl_port.needed_by) or a key of its profile
- * (rl_param.needed_by) that is absent: the error names pass, material, and port and layer, or key. */
+/* Fails where a material needs an optional port (rl_port.needed_by), a key of its profile
+ * (rl_param.needed_by) or a pass (rl_pass.fulfils) that is absent: the error names pass, material, and port
+ * and layer, or key. */
 rl_code rl_graph_check_needs(rl_arena *arena, const rl_graph *graph, const rl_materials *materials,
                              rl_error *err);
 

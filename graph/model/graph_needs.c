@@ -23,10 +23,10 @@ static int word_index(const char *words, const char *word)
     return -1;
 }
 
-/* "key: word" as the pass's shading row and the value that it asks for. */
-static rl_code find_need(const needs *n, const char *name, const char *need, const char **key, int *value)
+/* "key: word" as one of the rows and the value that it asks for. */
+static rl_code find_word(const needs *n, rl_params rows, const char *name, const char *need, const char **key,
+                         int *value)
 {
-    const rl_params rows = n->node->pass->shading_keys;
     char *text = rl_arena_strdup(n->arena, need), *colon = text ? strstr(text, ": ") : NULL;
     if (!text)
         return rl_fail_memory(n->err, strlen(need));
@@ -39,8 +39,13 @@ static rl_code find_need(const needs *n, const char *name, const char *need, con
     *key = text;
     return *value >= 0 ? RL_OK
                        : rl_fail(n->err, RL_E_INTERNAL, n->node->where,
-                                 "pass %s: '%s' is needed by '%s', which is no shading word of it",
+                                 "pass %s: '%s' is needed by '%s', which is no word of its rows",
                                  n->node->pass->name, name, need);
+}
+
+static rl_code find_need(const needs *n, const char *name, const char *need, const char **key, int *value)
+{
+    return find_word(n, n->node->pass->shading_keys, name, need, key, value);
 }
 
 static bool asks(const rl_materials *m, size_t material, const char *key, int value)
@@ -88,6 +93,43 @@ static rl_code check_row(const needs *n, const rl_param *row)
     return code;
 }
 
+static bool has_row(rl_params rows, const char *name)
+{
+    for (size_t i = 0; i < rows.n; i++)
+        if (!strcmp(rows.rows[i].name, name))
+            return true;
+    return false;
+}
+
+static bool has_pass(const rl_graph *graph, const rl_pass *pass)
+{
+    for (size_t i = 0; i < graph->n_nodes; i++)
+        if (graph->nodes[i].pass == pass)
+            return true;
+    return false;
+}
+
+/* A material whose profile asks for what only `pass` does, which the graph has not; n->node reads the key. */
+static rl_code check_pass(const needs *n, const rl_pass *pass)
+{
+    const char *key;
+    int value;
+    rl_code code = find_word(n, pass->profile_keys, pass->name, pass->fulfils, &key, &value);
+    if (code || !has_row(n->node->pass->profile_keys, key))
+        return code;
+    for (size_t i = 1; i < n->materials->count && !code; i++) {
+        double v[3] = {-1}, on[3] = {1};
+        rl_material_get(n->materials, i, "shading", key, on);
+        if (rl_material_has_profile(n->materials, i) && on[0] != 0 &&
+            rl_material_get(n->materials, i, "profile", key, v) && (int)v[0] == value)
+            code = rl_fail(n->err, RL_E_CONFIG, n->node->where,
+                           "the profile of material '%s' has '%s', which pass %s does: the graph has none; "
+                           "add it, or change the profile's '%s'",
+                           n->materials->names[i], pass->fulfils, pass->name, key);
+    }
+    return code;
+}
+
 rl_code rl_graph_check_needs(rl_arena *arena, const rl_graph *graph, const rl_materials *materials,
                              rl_error *err)
 {
@@ -101,6 +143,9 @@ rl_code rl_graph_check_needs(rl_arena *arena, const rl_graph *graph, const rl_ma
         for (size_t k = 0; k < pass->profile_keys.n && !code; k++)
             if (pass->profile_keys.rows[k].needed_by)
                 code = check_row(&n, &pass->profile_keys.rows[k]);
+        for (size_t k = 0; k < rl_pass_count() && !code; k++)
+            if (rl_pass_at(k)->fulfils && !has_pass(graph, rl_pass_at(k)))
+                code = check_pass(&n, rl_pass_at(k));
     }
     return code;
 }

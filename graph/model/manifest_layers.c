@@ -32,9 +32,9 @@ const rl_layer_type rl_layer_types[RL_LAYER_COUNT] = {
                             .help = "mean curvature, 1 / length, convex positive"},
     [RL_LAYER_BACK_DEPTH] = {"back_depth", RL_SCALAR, 1,
                              .keys = {"kind", "near", "far", "reversed", "empty", "unit"},
-                             .help = "depth of the closest back face"},
+                             .help = "depth of the closest back face, empty where there is none"},
     [RL_LAYER_BACK_NORMAL] = {"back_normal", RL_NORMAL, 3, .keys = {"space", "encoding"},
-                              .help = "normal of the closest back face"},
+                              .help = "normal of the closest back face, out of the object"},
     [RL_LAYER_BACK_ALBEDO] = {"back_albedo", RL_RGB, 3, .keys = {"colorspace"},
                               .help = "albedo of the closest back face"},
 };

@@ -11,7 +11,8 @@
  *     constant material_t *    one entry a dense stencil index  (generated: every registered pass's rows)
  *     constant light_t *       when .lights is set
  *     constant ambient_t *     when .ambient is set
- *     constant float *         when .tables is set: what the host computed
+ *     constant float *         when .tables is set: what the host computed (global const float * when it may
+ *                              be more than the 64 KiB that every device has as constant memory)
  */
 #ifndef RL_MODEL_PASS_H
 #define RL_MODEL_PASS_H
@@ -181,10 +182,11 @@ typedef struct rl_port {
     const char
         *needed_by; /* optional READ: "diffuse: sg" is a shading key of this pass and a word of it; a material
                        with a profile and that word makes the port required (graph.h); NULL = none does */
-    const char *of; /* HISTORY: the port (own output first, else own input) whose past this is */
-    rl_layout layout; /* the layout that the kernel wants; the plan inserts the conversion */
-    const char *with; /* SCRATCH: the REDUCTION port that it exists for; NULL = always */
-    bool any_layout;  /* WRITE: the kernel stores through RL_STORE, so the plan may choose (LAYOUT_NAME) */
+    const char *without; /* SCRATCH: an optional port; there is memory only where nothing feeds that */
+    const char *with;    /* SCRATCH: the REDUCTION port that it exists for; NULL = always */
+    const char *of;      /* HISTORY: the port (own output first, else own input) whose past this is */
+    rl_layout layout;    /* the layout that the kernel wants; the plan inserts the conversion */
+    bool any_layout;     /* WRITE: the kernel stores through RL_STORE, so the plan may choose (LAYOUT_NAME) */
 } rl_port;
 
 /* Whether a port makes an image of the graph. */
@@ -214,7 +216,8 @@ typedef struct rl_step {
     rl_domain domain;
     const char *when; /* a structural parameter: the step runs only where it is .is; NULL = always */
     int32_t is;
-    const char *with; /* a REDUCTION port: the step runs only when an output asks for it; NULL = always */
+    const char *with;    /* a REDUCTION port: the step runs only when an output asks for it; NULL = always */
+    const char *without; /* an optional port: the step runs only where nothing feeds it; NULL = always */
 } rl_step;
 
 /* ---- the pass ------------------------------------------------------------------------------------------ */
@@ -261,6 +264,10 @@ typedef struct rl_pass {
      * holds elsewhere. */
     double (*least_share)(const void *params);
     const char *fades_where;
+    /* "transmission: gather", a profile key of the pass and a word of it, that no other pass fulfils: a graph
+     * that reads the key elsewhere needs this pass too (graph.h). A shading key of that name that is false
+     * switches it off. NULL: there is no such word. */
+    const char *fulfils;
     /* Passes with a parameter `seed`: whether the result depends on it; `march`: some light has `shadow:
      * screen`. NULL: it always does. */
     bool (*stochastic)(const void *params, bool march);

@@ -143,6 +143,15 @@ static bool wants(const rl_planner *p, const rl_graph_node *node, const char *wi
     return !with;
 }
 
+/* Whether nothing feeds the port that `without` names; NULL: no such condition. */
+static bool is_without(const rl_graph_node *node, const char *without)
+{
+    for (size_t i = 0; without && i < node->pass->ports.n; i++)
+        if (node->pass->ports.rows[i].role == RL_READ && !strcmp(node->pass->ports.rows[i].name, without))
+            return node->images[i] < 0;
+    return true;
+}
+
 /* The buffers of a live node's ports; its scratch comes into being here. */
 static rl_code buffer_node(rl_planner *p, size_t place)
 {
@@ -158,7 +167,7 @@ static rl_code buffer_node(rl_planner *p, size_t place)
         const rl_image_plan *image = node->images[i] >= 0 ? &p->images[node->images[i]] : NULL;
         bound[i] = -1;
         if (port->role == RL_SCRATCH) {
-            if (!wants(p, node, port->with))
+            if (!wants(p, node, port->with) || !is_without(node, port->without))
                 continue;
             const char *name = rl_arena_printf(p->arena, "%s.%s", node->name, port->name);
             if (!name)
@@ -287,7 +296,7 @@ static rl_code make_steps(rl_planner *p)
         const rl_pass *pass = node->pass;
         for (size_t s = 0; s < pass->steps.n; s++) {
             if (!rl_step_runs(pass, &pass->steps.rows[s], node->params) ||
-                !wants(p, node, pass->steps.rows[s].with))
+                !wants(p, node, pass->steps.rows[s].with) || !is_without(node, pass->steps.rows[s].without))
                 continue;
             p->steps[p->n_steps++] =
                 (rl_plan_step){RL_STEP_KERNEL, p->order[i], (int)s, p->nodes[i].buffers, (int)pass->ports.n};

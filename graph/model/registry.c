@@ -6,6 +6,8 @@
  * passes/NAME.c. */
 #define RL_PASSES(X)                                                                                         \
     X(lighting)                                                                                              \
+    X(back_lighting)                                                                                         \
+    X(translucency)                                                                                          \
     X(sss_burley)                                                                                            \
     X(sss_gaussian)                                                                                          \
     X(sss_reference)                                                                                         \

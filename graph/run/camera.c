@@ -67,3 +67,41 @@ bool rl_camera_jumped(const camera_t *a, const camera_t *b, double reach)
     double zoom = (double)b->focal[0] / (double)a->focal[0];
     return dot < 0.8660254 || sqrt(moved) > reach || zoom > 1.5 || zoom < 1 / 1.5;
 }
+
+static double row(const float *m, int i, const double *p)
+{
+    return (double)m[4 * i] * p[0] + (double)m[4 * i + 1] * p[1] + (double)m[4 * i + 2] * p[2] +
+           (double)m[4 * i + 3];
+}
+
+/* Whether the point at depth z under display pixel (x, y) lay in the window before. */
+static bool was_seen(const camera_t *now, const camera_t *before, const rl_depth_view *d, int x, int y,
+                     double z)
+{
+    double view[3] = {(x + 0.5 - (double)now->centre[0]) / (double)now->focal[0] * z,
+                      -(y + 0.5 - (double)now->centre[1]) / (double)now->focal[1] * z, -z};
+    double world[3], p[3];
+    for (int i = 0; i < 3; i++)
+        world[i] = row(now->to_world, i, view);
+    for (int i = 0; i < 3; i++)
+        p[i] = row(before->to_view, i, world);
+    double px = (double)before->centre[0] + (double)before->focal[0] * p[0] / -p[2];
+    double py = (double)before->centre[1] - (double)before->focal[1] * p[1] / -p[2];
+    return p[2] < 0 && px >= d->x && py >= d->y && px < d->x + d->width && py < d->y + d->height;
+}
+
+double rl_camera_share_seen(const camera_t *now, const camera_t *before, const rl_depth_view *d)
+{
+    enum { SIDE = 16 };
+    int n = 0, seen = 0;
+    for (int i = 0; i < SIDE * SIDE; i++) {
+        int x = (int)((2LL * (i % SIDE) + 1) * d->width / (2 * SIDE));
+        int y = (int)((2LL * (i / SIDE) + 1) * d->height / (2 * SIDE));
+        double z = (double)d->pixels[(size_t)y * d->stride + (size_t)x];
+        if (!(z > 0))
+            continue;
+        n++;
+        seen += was_seen(now, before, d, d->x + x, d->y + y, z);
+    }
+    return n ? (double)seen / n : 1;
+}

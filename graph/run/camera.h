@@ -3,6 +3,7 @@
 #define RL_RUN_CAMERA_H
 
 #include <stdbool.h>
+#include <stddef.h>
 
 #include "graph/base/error.h"
 #include "kernels/shared.h"
@@ -27,6 +28,17 @@ rl_code rl_camera_make(const rl_camera_info *info, camera_t *out, rl_error *err)
 /* True when b is so far from a that reprojection makes no sense: the view direction turned by more than 30
  * degrees, the camera moved by more than `reach` metres, or the focal length changed by more than a half. */
 bool rl_camera_jumped(const camera_t *a, const camera_t *b, double reach);
+
+/* Planar depth in metres, 0 where empty, of the display pixels from (x, y) on. */
+typedef struct rl_depth_view {
+    const float *pixels;
+    size_t stride; /* floats */
+    int x, y, width, height;
+} rl_depth_view;
+
+/* Of what `now` sees, the share that lay in front of `before` and inside of the same window: of 16 x 16
+ * samples of the depth; hiding is not looked at. 1 when all is empty. */
+double rl_camera_share_seen(const camera_t *now, const camera_t *before, const rl_depth_view *depth);
 
 #ifdef __cplusplus
 }

@@ -1,11 +1,13 @@
 /* A frame through a session: its kernels, its files, and one at a time. */
 #include <limits.h>
+#include <math.h>
 #include <string.h>
 
 #include "graph/base/alloc.h"
 #include "graph/base/file.h"
 #include "graph/run/camera.h"
 #include "graph/run/session_notes.h"
+#include "graph/run/session_state.h"
 
 rl_code rl_session_fit_buffers(rl_sequence *q, rl_frame *f, rl_error *err)
 {
@@ -15,25 +17,57 @@ rl_code rl_session_fit_buffers(rl_sequence *q, rl_frame *f, rl_error *err)
     return rl_frame_buffers_new(q->executor, &f->geometry, &f->buffers, err);
 }
 
-/* History ends where the manifest says, at a gap of the numbers, after a frame that failed, at a jump of the
- * camera. */
+/* A camera that goes away from more than this of what it sees has jumped. */
+#define LEAST_SEEN 0.25
+/* … and, in a graph without depth, one that moved by more metres. */
+#define REACH 10
+
+static int depth_buffer(const rl_plan *p)
+{
+    for (size_t i = 0; i < p->n_buffers; i++)
+        if (p->buffers[i].kind == RL_BUFFER_SOURCE && !strcmp(p->buffers[i].name, "capture.depth"))
+            return (int)i;
+    return -1;
+}
+
+/* A jump is a matter of scale: ten metres are little from an aeroplane and much for a macro lens. */
+static rl_code find_jump(const rl_sequence *q, const rl_frame *f, bool *jumped, rl_error *err)
+{
+    int buffer = depth_buffer(q->plan);
+    rl_sink_image image;
+    rl_memory *memory;
+    *jumped = rl_camera_jumped(&q->last_camera, &f->camera, buffer >= 0 ? INFINITY : REACH);
+    if (*jumped || buffer < 0 || !memcmp(q->last_camera.to_view, f->camera.to_view, sizeof f->camera.to_view))
+        return RL_OK;
+    rl_code code = rl_session_map_image(q, f, buffer, &image, &memory, err);
+    if (code)
+        return code;
+    rl_depth_view view = {image.pixels,  image.stride,      f->geometry.x,
+                          f->geometry.y, f->geometry.width, f->geometry.height};
+    *jumped = rl_camera_share_seen(&f->camera, &q->last_camera, &view) < LEAST_SEEN;
+    return rl_memory_unmap(memory, err);
+}
+
+/* History ends where the manifest says, at a gap of the numbers, after a frame that failed. */
 static bool is_cut(const rl_sequence *q, const rl_frame *f)
 {
     const rl_manifest *m = q->manifest;
     if (!q->has_last || rl_frames_find(&m->cuts, f->number) >= 0)
         return true;
     long here = rl_frames_find(&m->frames, f->number), last = rl_frames_find(&m->frames, q->last_number);
-    bool gap = here >= 0 && last >= 0 ? here != last + 1 : f->number != q->last_number + 1;
-    return gap || rl_camera_jumped(&q->last_camera, &f->camera, 10);
+    return here >= 0 && last >= 0 ? here != last + 1 : f->number != q->last_number + 1;
 }
 
 rl_code rl_sequence_execute(rl_sequence *q, rl_frame *f, const rl_scene_values *scenes, rl_span *spans,
                             rl_error *err)
 {
     rl_code code = rl_executor_resize(q->executor, &f->geometry, err);
+    bool cut = is_cut(q, f);
+    if (!code && !cut && rl_plan_has_history(q->plan))
+        code = find_jump(q, f, &cut, err);
     if (code)
         return code;
-    if (is_cut(q, f))
+    if (cut)
         rl_executor_cut(q->executor);
     rl_frame_values values = {.number = f->number, .camera = f->camera, .scenes = scenes};
     code = rl_executor_run(q->executor, f->buffers, &values, spans, err);

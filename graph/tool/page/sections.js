@@ -178,7 +178,7 @@ class Sections {
   }
 
   energyTable(list) {
-    const parts = Object.entries({border: "#At borders", off_screen: "#Off screen", clamped: "#Clamped", redistributed: "#Redistributed"})
+    const parts = Object.entries({border: "#At borders", off_screen: "#Off screen", clamped: "#Clamped", redistributed: "#Given back"})
       .filter(([k]) => list.some(r => r[k]));
     const mean = v => (v ? (v[0] + v[1] + v[2]) / 3 : 0), groups = new Map(), many = this.metrics.captures.length > 1;
     for (const r of list) {
