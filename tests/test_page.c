@@ -1,4 +1,4 @@
-/* report.html: what is packed, which frames are held, what is left behind; and the page in a real browser. */
+/* report.html: what is packed, which frames are held, what is left behind. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -436,63 +436,6 @@ static void plans_show_times_of_a_trace(void **state)
     }
 }
 
-/* ---- the browser --------------------------------------------------------------------------------------- */
-
-/* What tests/page_browser.py says, a line a test. */
-static char browser_says[65536];
-static int browser_status = -1;
-
-static void run_browser(void)
-{
-    page_make_options o = options_for("main.html");
-    rl_ab_page_summary got;
-    rl_error err = {0};
-    assert_int_equal(page_make(&o, &got, &err), RL_OK);
-    o.path = in_folder("evil.html");
-    o.name = "</script><img src=x onerror=\"window.evil=1\">";
-    assert_int_equal(page_make(&o, &got, &err), RL_OK);
-    o = options_for("reference.html");
-    o.reference = o.plain = true;
-    o.failed = 1;
-    assert_int_equal(page_make(&o, &got, &err), RL_OK);
-
-    assert_int_equal(page_make_plan(in_folder("plan.html"), in_folder("trace.json"), "a</script>a", &err),
-                     RL_OK);
-
-    const char *const arguments[] = {"ab",       "configs/skin.yaml",
-                                     "--vary",   "profiles.skin.texturing=post,pre_post",
-                                     "--frames", "1",
-                                     "--seeds",  "1",
-                                     "--out",    in_folder("real"),
-                                     "--quiet",  NULL};
-    tool_result real = tool_run(arguments);
-    assert_int_equal(real.status, 0);
-    tool_result_free(&real);
-
-    char command[512];
-    snprintf(command, sizeof command, "python3 tests/page_browser.py '%s' 2>&1", folder);
-    FILE *pipe = popen(command, "r");
-    assert_non_null(pipe);
-    size_t n = fread(browser_says, 1, sizeof browser_says - 1, pipe);
-    browser_says[n] = 0;
-    int status = pclose(pipe);
-    browser_status = WIFEXITED(status) ? WEXITSTATUS(status) : 1;
-}
-
-static void works_in_a_browser(void **state)
-{
-    (void)state;
-    run_browser();
-    if (browser_status == 77 || browser_status == 127) {
-        print_message("%s", browser_says[0] ? browser_says : "no python3\n");
-        skip();
-    }
-    if (browser_status)
-        print_error("%s", browser_says);
-    assert_int_equal(browser_status, 0);
-    assert_int_equal(count(browser_says, "passed "), 28);
-}
-
 static int make_folder(void **state)
 {
     (void)state;
@@ -516,7 +459,7 @@ int main(void)
         cmocka_unit_test(says_what_is_left_out),       cmocka_unit_test(shows_as_opencolorio_does),
         cmocka_unit_test(keeps_to_its_budget),         cmocka_unit_test(leaves_nothing_behind),
         cmocka_unit_test(survives_lack_of_memory),     cmocka_unit_test(metrics_must_be_an_object),
-        cmocka_unit_test(plans_show_times_of_a_trace), cmocka_unit_test(works_in_a_browser),
+        cmocka_unit_test(plans_show_times_of_a_trace),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

@@ -91,9 +91,9 @@ class GraphView {
     const {from: a, to: b} = e, r = v => v.toFixed(1);
     let d;
     if (e.history) {
-      const dip = 16 + (wide ? NODE.height : 0);
-      d = wide ? `M${r(a.x + a.w * 0.65)} ${r(a.y + NODE.height)}C${r(a.x + a.w * 0.65)} ${r(a.y + dip + 8)} ${r(b.x + b.w * 0.35)} ${r(b.y + dip + 8)} ${r(b.x + b.w * 0.35)} ${r(b.y + NODE.height)}`
-               : `M${r(a.x + a.w)} ${r(a.y + 32)}C${r(a.x + a.w + 22)} ${r(a.y + 40)} ${r(b.x + b.w + 22)} ${r(b.y + 6)} ${r(b.x + b.w)} ${r(b.y + 14)}`;
+      const x1 = a.x + a.w * (wide ? 0.65 : 1), x2 = b.x + b.w * (wide ? 0.35 : 1), low = NODE.height, deep = low + 24;
+      d = wide ? `M${r(x1)} ${r(a.y + low)}C${r(x1)} ${r(a.y + deep)} ${r(x2)} ${r(b.y + deep)} ${r(x2)} ${r(b.y + low)}`
+               : `M${r(x1)} ${r(a.y + 32)}C${r(x1 + 22)} ${r(a.y + 40)} ${r(x2 + 22)} ${r(b.y + 6)} ${r(x2)} ${r(b.y + 14)}`;
     } else if (wide) {
       const x1 = a.x + a.w, y1 = a.y + NODE.height / 2, x2 = b.x - 1, y2 = b.y + NODE.height / 2, k = Math.max((x2 - x1) * 0.45, 20);
       d = `M${r(x1)} ${r(y1)}C${r(x1 + k)} ${r(y1)} ${r(x2 - k)} ${r(y2)} ${r(x2)} ${r(y2)}`;
@@ -134,11 +134,13 @@ class GraphView {
   describe(n) {
     for (const e of this.edges || []) if (e.element) e.element.classList.toggle("lit", n !== null && (e.from === n || e.to === n));
     if (!n) {
-      this.detail.replaceChildren(h("p", {class: "small"}, this.nodes.some(x => x.varied) ? [h("i", {class: "key varied"}), "not the same in all variants"] : null,
+      const varied = this.nodes.some(x => x.varied);
+      this.detail.replaceChildren(h("p", {class: "small"}, varied ? [h("i", {class: "key varied"}), "not the same in all variants"] : null,
         this.total ? [h("i", {class: "key cost"}), "ms a frame on the device"] : null, h("i", {class: "key history"}), "the frame before"));
       return;
     }
-    const inputs = this.edges.filter(e => e.to === n).flatMap(e => e.list), outs = [...new Set(this.edges.filter(e => e.from === n).flatMap(e => e.list.map(x => x.image)))];
+    const inputs = this.edges.filter(e => e.to === n).flatMap(e => e.list);
+    const outs = [...new Set(this.edges.filter(e => e.from === n).flatMap(e => e.list.map(x => x.image)))];
     this.detail.replaceChildren(h("p", {}, h("b", {}, n.name), n.capture ? "" : ` ${n.pass}`,
         n.capture ? "" : h("span", {class: "small"}, ` \u00b7 ${this.users(n)}`, n.ms ? ` \u00b7 ${number(n.ms)} ms a frame` : "")),
       h("p", {class: "small"}, n.capture ? "gives " + outs.join(", ")

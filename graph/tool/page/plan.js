@@ -43,14 +43,16 @@ class PlanView {
       for (const p of n.ports)
         if ((p.role === "read" || p.role === "history") && p.image)
           edges.push({from: this.made.get(p.image) || "capture", to: n.name, image: p.image, port: p.name, history: p.role === "history"});
-    const culled = this.plan.culled.length ? h("p", {class: "small"}, "Left out, since no output needs them: " + this.plan.culled.join(", ") + ".") : null;
+    const words = `Left out, since no output needs them: ${this.plan.culled.join(", ")}.`;
+    const culled = this.plan.culled.length ? h("p", {class: "small"}, words) : null;
     return this.section("graph", "Graph", new GraphView({nodes, edges}, {variants: this.variants}).element, culled);
   }
 
   stepName(step) {
     if (step.kind === "kernel") return [h("b", {}, step.node), " ", h("code", {}, step.entry)];
     const [from, to] = step.buffers.map(b => this.plan.buffers[b]);
-    return step.kind === "convert" ? [h("span", {class: "small"}, "convert "), `${from.name} to ${to.layout}`] : [h("span", {class: "small"}, "keep "), from.name];
+    const converts = step.kind === "convert";
+    return [h("span", {class: "small"}, converts ? "convert " : "keep "), converts ? `${from.name} to ${to.layout}` : from.name];
   }
 
   steps() {
@@ -64,16 +66,14 @@ class PlanView {
         .map(p => (p.role === "history" ? "past " : "") + name(p.buffer)).join(", ");
     };
     const total = times.reduce((a, b) => a + (b || 0), 0);
+    const time = t => h("span", {class: "time"}, t === null ? NONE
+      : [h("span", {class: "track"}, h("span", {class: "fill main", style: {width: t / most * 100 + "%"}})), h("span", {class: "value"}, number(t))]);
+    const row = (x, i) => [i, this.stepName(x), ...(timed ? [time(times[i])] : []), h("small", {}, list(x, false)), h("small", {}, list(x, true)),
+                           h("small", {}, moved(x) ? bytes(moved(x)) : NONE)];
     return this.section("steps", "Steps", h("p", {class: "small"},
         timed ? `${number(total)} ms on the device a frame, the mean of ${plural(this.times.frames, "frame")} of the trace. ` : null,
         this.plan.buffers.some(b => b.layout === "phase4") ? "\u2032 marks the phase4 layout." : null),
-      h("div", {class: "scroll", tabindex: 0, role: "region", "aria-label": "Table of the steps"}, h("table", {class: "steps"},
-        h("thead", {}, h("tr", {}, [h("th", {scope: "col"}, "#"), h("th", {scope: "col"}, "Step"), timed ? h("th", {scope: "col"}, "ms") : null,
-          h("th", {scope: "col"}, "Reads"), h("th", {scope: "col"}, "Writes"), h("th", {scope: "col", class: "num"}, "Buffers")])),
-        h("tbody", {}, this.plan.steps.map((x, i) => h("tr", {}, h("td", {class: "small"}, i), h("th", {scope: "row"}, this.stepName(x)),
-          timed ? h("td", {class: "time"}, times[i] === null ? NONE : [h("span", {class: "track"}, h("span", {class: "fill main", style: {width: times[i] / most * 100 + "%"}})),
-                                                                  h("span", {class: "value"}, number(times[i]))]) : null,
-          h("td", {class: "small"}, list(x, false)), h("td", {class: "small"}, list(x, true)), h("td", {class: "num small"}, moved(x) ? bytes(moved(x)) : NONE)))))));
+      table("Steps", ["No.", "Step", ...(timed ? ["ms"] : []), "Reads", "Writes", "#Buffers"], this.plan.steps.map(row), {class: "steps"}));
   }
 
   /* A row a buffer, but one a slot: what shares memory is in one line. */
@@ -98,26 +98,34 @@ class PlanView {
         const y = top + i * high;
         return s("g", {class: "life " + r.kind}, text({x: 0, y: y + 14, class: "label"}, short(r.label, 26), s("title", {}, r.label)),
           r.list.map(b => {
-            const from = Math.max(b.first, 0), to = Math.min(b.last, this.last), wide = (to + 1 - from) * cell - 2, room = Math.floor(wide / 6.2);
+            const from = Math.max(b.first, 0), to = Math.min(b.last, this.last), end = to === this.last ? "write" : to, wide = (to + 1 - from) * cell - 2, room = Math.floor(wide / 6.2);
             return s("g", {}, s("rect", {x: x(from) + 1, y: y + 2, width: wide, height: high - 5, rx: 4}),
               r.kind === "transient" && room > 4 ? text({x: x(from) + 7, y: y + 14, class: "inside"}, short(b.name, room)) : null,
-              s("title", {}, `${b.name}, ${plural(b.planes, "plane")} ${b.layout}, steps ${from}\u2013${to === this.last ? "write" : to}` + (b.scratch ? ", scratch" : "")));
+              s("title", {}, `${b.name}, ${plural(b.planes, "plane")} ${b.layout}, steps ${from}\u2013${end}${b.scratch ? ", scratch" : ""}`));
           }), r.bytes ? text({x: W, y: y + 14, class: "tick y"}, bytes(r.bytes) + (r.copies > 1 ? ` \u00d7 ${r.copies}` : "")) : null);
       }));
-    const keys = Object.keys(CLASSES).filter(k => rows.some(r => r.kind === k)).map(k => [h("i", {class: "key " + (k === "history" ? "kept" : k)}), CLASSES[k]]);
-    return this.section("lifetimes", "Lifetimes", h("p", {class: "small"}, "From the step that fills a buffer to the last that reads it. ", keys), h("div", {class: "scroll", tabindex: 0, role: "region", "aria-label": "Lifetimes"}, chart));
+    const keys = Object.keys(CLASSES).filter(k => rows.some(r => r.kind === k))
+      .map(k => [h("i", {class: "key " + (k === "history" ? "kept" : k)}), CLASSES[k]]);
+    return this.section("lifetimes", "Lifetimes",
+      h("p", {class: "small"}, "From the step that fills a buffer to the last that reads it."), h("p", {class: "small keys-line"}, keys),
+      h("div", {class: "scroll", tabindex: 0, role: "region", "aria-label": "Lifetimes"}, chart));
   }
 
   memory() {
     const m = this.plan.memory, rows = this.rows(), peak = this.plan.peak;
     if (!m) return null;
-    const sums = Object.keys(CLASSES).map(k => ({name: CLASSES[k], kind: k, bytes: rows.filter(r => r.kind === k).reduce((t, r) => t + r.copies * (r.bytes || 0), 0)})).filter(x => x.bytes);
+    const sum = kind => rows.filter(r => r.kind === kind).reduce((t, r) => t + r.copies * (r.bytes || 0), 0);
+    const sums = Object.keys(CLASSES).map(k => ({name: CLASSES[k], kind: k, bytes: sum(k)})).filter(x => x.bytes);
     const parts = peak ? ["buffers", "reading", "writing", "checkpoint"].filter(k => peak[k]).map(k => ({name: k, bytes: peak[k]})) : [];
-    const bars = (title, list, total) => h("figure", {class: "multiple bars"}, h("figcaption", {}, title, h("small", {}, " " + bytes(total))), h("dl", {}, list.map(x => [
-      h("dt", {}, x.name), h("dd", {}, h("span", {class: "track"}, h("span", {class: "fill " + (x.kind || "main"), style: {width: x.bytes / Math.max(...list.map(y => y.bytes)) * 100 + "%"}})), h("span", {class: "value"}, bytes(x.bytes)))])));
+    const chart = (title, list, total) => {
+      const most = Math.max(...list.map(y => y.bytes));
+      return bars(title, bytes(total), list.map(x => ({name: x.name, class: x.kind || "main", share: x.bytes / most, value: bytes(x.bytes)})));
+    };
     const saved = m.bytes_unshared > m.bytes ? ` Without shared slots the buffers would take ${bytes(m.bytes_unshared)}.` : "";
-    return this.section("memory", "Memory", h("p", {class: "small"}, `${m.data_window[2]} \u00d7 ${m.data_window[3]} pixels in buffers of ${m.columns} \u00d7 ${m.rows}, ${plural(m.in_flight, "frame")} in flight.` + saved),
-      h("div", {class: "multiples"}, bars("Buffers", sums, m.bytes), parts.length ? bars("Peak of a run", parts, peak.total) : null));
+    const words = `${m.data_window[2]} \u00d7 ${m.data_window[3]} pixels in buffers of ${m.columns} \u00d7 ${m.rows}, ` +
+      `${plural(m.in_flight, "frame")} in flight.${saved}`;
+    return this.section("memory", "Memory", h("p", {class: "small"}, words),
+      h("div", {class: "multiples"}, chart("Buffers", sums, m.bytes), parts.length ? chart("Peak of a run", parts, peak.total) : null));
   }
 
   all() { return [this.graph(), this.steps(), this.lifetimes(), this.memory()].filter(Boolean); }
@@ -128,14 +136,17 @@ class PlanView {
   const add = (plan, group, variants, title, id) => {
     const view = new PlanView(plan, group, variants, trace, id), list = view.all();
     if (title) list.unshift(h("h2", {class: "part"}, title));
-    facts.push([title, plural(plan.nodes.length, "node"), plural(plan.steps.length, "step"), plan.peak ? bytes(plan.peak.total) + " at most" : null].filter(Boolean).join(", "));
+    const peak = plan.peak ? bytes(plan.peak.total) + " at most" : null;
+    facts.push([title, plural(plan.nodes.length, "node"), plural(plan.steps.length, "step"), peak].filter(Boolean).join(", "));
     sections.push(...list);
   };
   plans.forEach((p, i) => {
     const many = plans.length > 1;
     if (!p.groups) return add(p, null, [], many ? p.capture || `capture ${i + 1}` : null, many ? "-" + i : "");
-    if (!i) facts.push(`${plural(p.variants.length, "variant")} = ${fixed(p.cost.factor, 2)}\u00d7 one (${fixed(p.cost.sum, 2)}\u00d7 one after the other)`);
-    p.groups.forEach((g, k) => add(g.plan, g, p.variants, [many ? p.capture : null, g.reason].filter(Boolean).join(": "), many || p.groups.length > 1 ? `-${i}-${k}` : ""));
+    const times = x => fixed(x, 2) + "\u00d7", parts = many || p.groups.length > 1;
+    const title = g => [many ? p.capture : null, g.reason].filter(Boolean).join(": ");
+    if (!i) facts.push(`${plural(p.variants.length, "variant")} = ${times(p.cost.factor)} one (${times(p.cost.sum)} one after the other)`);
+    p.groups.forEach((g, k) => add(g.plan, g, p.variants, title(g), parts ? `-${i}-${k}` : ""));
   });
   if (trace) facts.push(`times of ${plural(trace.frames, "frame")}`);
   byId("facts").append(...facts.map(f => h("li", {}, f)));

@@ -17,7 +17,7 @@ const tickText = v => String(Number(v.toPrecision(6))).replace("-", MINUS);
 /* From 0 where 0 is "no difference", else around what there is. */
 function range(metric, values) {
   if (!values.length) return [0, 1];
-  const most = Math.max(...values), least = Math.min(...values);
+  const most = values.reduce((a, b) => Math.max(a, b)), least = values.reduce((a, b) => Math.min(a, b));
   if (!metricRises(metric)) return [0, most > 0 ? most * 1.06 : 1];
   const pad = (most - least) * 0.1 || Math.abs(most) * 0.02 || 1;
   return [least - pad, most + pad];
@@ -81,7 +81,7 @@ class LinePlot {
     const whole = this.series.find(x => x.main) || this.series[0];
     const list = whole ? [...whole.values.values()].filter(v => v !== null) : [];
     this.svg.setAttribute("aria-label", `${metricName(this.metric)} over ${this.frames.length} frames` +
-      (list.length ? `, ${whole.name}: ${number(Math.min(...list))} to ${number(Math.max(...list))}` : "") +
+      (list.length ? `, ${whole.name}: ${number(list.reduce((a, b) => Math.min(a, b)))} to ${number(list.reduce((a, b) => Math.max(a, b)))}` : "") +
       "; left and right read a frame, Enter shows it");
   }
 
@@ -139,15 +139,9 @@ class LinePlot {
 /* A bar a material; a tick where chance ends. rows: [{name, color, value, bound, beyond}] */
 function barPlot(metric, rows) {
   const values = rows.flatMap(r => [r.value, r.bound]).filter(v => v !== null && v !== undefined);
-  const [low, high] = range(metric, values), share = v => clamp((v - low) / (high - low), 0, 1) * 100 + "%";
-  return h("figure", {class: "multiple bars"},
-    h("figcaption", {title: METRIC_HELP[metric]}, metricName(metric),
-      METRIC_UNITS[metric] ? h("small", {}, " " + METRIC_UNITS[metric]) : null),
-    h("dl", {}, rows.map(r => [
-      h("dt", {}, r.name),
-      h("dd", {}, h("span", {class: "track"},
-          r.value === null ? null : h("span", {class: "fill", style: {width: share(r.value), "--c": r.color}}),
-          r.bound === null || r.bound === undefined ? null : h("span", {class: "limit", style: {left: share(r.bound)}, title: "what chance makes: " + number(r.bound)})),
-        h("span", {class: "value"}, number(r.value), r.beyond ? h("b", {class: "beyond", title: "beyond what chance makes"}, "\u25cf") : null))
-    ])));
+  const [low, high] = range(metric, values), share = v => (typeof v === "number" ? (v - low) / (high - low) : null);
+  const dot = () => h("b", {class: "beyond", title: "beyond what chance makes"}, "\u25cf");
+  return bars({text: metricName(metric), help: METRIC_HELP[metric]}, METRIC_UNITS[metric], rows.map(r => ({
+    name: r.name, color: r.color, share: share(r.value), value: [number(r.value), r.beyond ? dot() : null],
+    limit: share(r.bound), about: "what chance makes: " + number(r.bound)})));
 }

@@ -59,12 +59,14 @@ function metricTable(measures, {capture, pair, stat}, color, show) {
   const cell = (material, metric) => {
     const o = measures.over(capture, pair, material, metric, stat);
     if (o.mean === null) return h("td", {class: "none"}, metric === "psnr" && o.n ? h("span", {title: "no difference"}, "\u221e") : NONE);
+    const worst = o.worst[stat];
     const chance = o.known ? `${o.beyond} of ${plural(o.n, "frame")} beyond chance` : null;
     return h("td", {},
       h("span", {class: "number"}, number(o.mean)),
       o.beyond ? h("b", {class: "beyond", title: chance}, "\u25cf", h("span", {class: "hidden"}, ` (${chance})`)) : null,
-      many && isDifference(metric, o.worst[stat]) ? h("button", {type: "button", class: "link", title: `worst: ${number(o.worst[stat])} at frame ${o.worst.frame}`,
-                          onclick: () => show(capture, o.worst.frame, pair, metric)}, `${number(o.worst[stat])} @${THIN}${o.worst.frame}`) : null);
+      many && isDifference(metric, worst)
+        ? h("button", {type: "button", class: "link", title: `worst: ${number(worst)} at frame ${o.worst.frame}`,
+                       onclick: () => show(capture, o.worst.frame, pair, metric)}, `${number(worst)} @${THIN}${o.worst.frame}`) : null);
   };
   return h("div", {class: "scroll", tabindex: 0, role: "region", "aria-label": "Table of the metrics"}, h("table", {class: "metrics"},
     h("caption", {class: "hidden"}, "Mean over frames, and the worst frame"),

@@ -36,7 +36,7 @@ function number(x, digits = 3) {
 }
 
 /* A fixed number of decimals, for columns of pixels. */
-const fixed = (x, n) => (x === null || !Number.isFinite(x) ? NONE : x.toFixed(n).replace("-", MINUS));
+const fixed = (x, n) => (x === null || !Number.isFinite(x) ? NONE : x.toFixed(n).replace(/^-(?=[0.]*$)/, "").replace("-", MINUS));
 
 const METRIC_NAMES = {flip: "FLIP", hdrflip: "HDR-FLIP", psnr: "PSNR", ssim: "SSIM", rmse: "RMSE", max: "Max diff"};
 const METRIC_UNITS = {psnr: "dB"};
@@ -61,6 +61,32 @@ function pathUrl(path) {
   const url = path.split("/").map(encodeURIComponent).join("/");
   return path.startsWith("/") ? "file://" + url : "./" + url;
 }
+
+/* A table that scrolls on its own. head: texts, with '#' in front of a column of numbers. rows: cells, of which the
+ * first names its row; or {cells, …} with attributes of the row. */
+function table(label, head, rows, attributes) {
+  const kind = i => (head[i].startsWith("#") ? "num" : null);
+  const cell = (c, i) => (i ? h("td", {class: kind(i)}, c) : h("th", {scope: "row"}, c));
+  return h("div", {class: "scroll", tabindex: 0, role: "region", "aria-label": label}, h("table", attributes,
+    h("thead", {}, h("tr", {}, head.map((t, i) => h("th", {scope: "col", class: kind(i)}, t.replace(/^#/, ""))))),
+    h("tbody", {}, rows.map(r => {
+      const {cells, ...others} = Array.isArray(r) ? {cells: r} : r;
+      return h("tr", others, cells.map(cell));
+    }))));
+}
+
+/* Bars beside names. list: [{name, share (0 … 1 or null), value, class, color, title, limit (a share), about, mark}] */
+function bars(title, unit, list) {
+  const percent = x => clamp(x, 0, 1) * 100 + "%";
+  const track = b => h("span", {class: "track"},
+    b.share === null ? null : h("span", {class: "fill " + (b.class || ""), style: {width: percent(b.share), ...(b.color ? {"--c": b.color} : {})}}),
+    typeof b.limit === "number" ? h("span", {class: "limit", style: {left: percent(b.limit)}, title: b.about}) : null);
+  return h("figure", {class: "multiple bars"},
+    h("figcaption", title.help ? {title: title.help} : {}, title.text || title, unit ? h("small", {}, " " + unit) : null),
+    h("dl", {}, list.map(b => [h("dt", {title: b.title}, b.name), h("dd", {}, track(b), h("span", {class: "value"}, b.value))])));
+}
+
+const control = (label, id, element) => h("div", {class: "control"}, h("label", {for: id}, label), element);
 
 let liveTimer = 0;
 /* Said to those who do not see the picture. */
@@ -92,7 +118,8 @@ function segmented(label, options, value, change) {
 
 /* The system's choice until somebody chooses. */
 function switchTheme() {
-  const root = document.documentElement, dark = root.dataset.theme ? root.dataset.theme === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
+  const root = document.documentElement, system = matchMedia("(prefers-color-scheme: dark)").matches;
+  const dark = root.dataset.theme ? root.dataset.theme === "dark" : system;
   root.dataset.theme = dark ? "light" : "dark";
   byId("theme").setAttribute("aria-label", `Theme: ${root.dataset.theme}`);
 }

@@ -27,7 +27,8 @@ class Viewer {
     this.variants = metrics.variants || [];
     this.loaded = null; /* what is drawn: pictures, map, ids */
     this.ticket = 0;
-    const frame = this.firstFrame(), pair = metrics.pairs[worstPair(metrics, this.held[frame])] || {reference: 0, test: Math.min(1, this.variants.length - 1)};
+    const frame = this.firstFrame(), any = {reference: 0, test: Math.min(1, this.variants.length - 1)};
+    const pair = metrics.pairs[worstPair(metrics, this.held[frame])] || any;
     this.state = {frame, a: pair.reference === null ? -1 : pair.reference, b: pair.test,
                   mode: "wipe", wipe: 0.5, flipped: false, exposure: 0,
                   display: page.displays.length ? "pipeline" : "srgb", overlay: "none", opacity: 0.75,
@@ -71,7 +72,8 @@ class Viewer {
     this.marks = [h("div", {class: "pixel", hidden: true}), h("div", {class: "pixel", hidden: true})];
     this.message = h("p", {class: "message", hidden: true});
     const colors = Array.from({length: 9}, (_, i) => `rgb(${this.page.heat.slice(3 * Math.round(i * 255 / 8)).slice(0, 3)})`);
-    this.legend = h("div", {class: "heat", hidden: true}, h("span"), h("i", {style: {background: `linear-gradient(90deg, ${colors})`}}), h("span", {}, "1"));
+    const ramp = h("i", {style: {background: `linear-gradient(90deg, ${colors})`}});
+    this.legend = h("div", {class: "heat", hidden: true}, h("span"), ramp, h("span", {}, "1"));
     this.stage = h("div", {class: "stage"}, this.canvas, this.tagA, this.tagB, this.handle, this.marks, this.legend, this.message);
     this.readout = new Readout(this);
     this.root.append(this.choices(), this.stage, this.controls(), this.readout.element, this.notes());
@@ -99,8 +101,8 @@ class Viewer {
   }
 
   controls() {
-    const displays = [...(this.page.displays.length ? [{value: "pipeline", label: this.page.displays[0].name}] : []),
-                      {value: "srgb", label: "plain sRGB"}];
+    const own = this.page.displays, displays = [{value: "srgb", label: "plain sRGB"}];
+    if (own.length) displays.unshift({value: "pipeline", label: own.length > 1 ? "each its own" : own[0].name});
     this.exposure = h("input", {id: "exposure", type: "range", min: EXPOSURES.low, max: EXPOSURES.high,
                                 step: EXPOSURES.step, value: 0,
                                 oninput: () => this.set({exposure: Number(this.exposure.value)})});
@@ -136,6 +138,7 @@ class Viewer {
       parts.push(`This page holds ${this.held.length} of ${plural(total, "frame")}; the others are linked below.`);
     if (page.leftOut)
       parts.push(`${plural(page.leftOut, "more frame")} did not fit its ${Math.round(page.budget / 1048576)}\u00a0MiB.`);
+    if (this.held.some(f => f.encoded)) parts.push("The reference is no scene-linear image: it is shown as plain sRGB.");
     for (const d of page.displays)
       if (d.pixels)
         parts.push(`${d.name} is a table of ${d.n}\u00b3 colours here: off by ${number(d.errorMean * 255, 2)}/255 in the ` +
