@@ -25,6 +25,9 @@ typedef RL_CAT(uint, RL_W) uintv;
 #define RL_LANES ((intv)(0, 1, 2, 3))
 #endif
 
+/* In front of a loop over channels: PoCL leaves it a loop otherwise, and the vectors it runs over in memory. */
+#define RL_UNROLL _Pragma("unroll")
+
 #define RL_LINEAR 0
 #define RL_PHASE4 1
 #define RL_PI     3.14159265358979f

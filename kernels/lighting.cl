@@ -35,6 +35,7 @@ static inline void add_point(constant material_t *m, const surface_t *s, constan
     floatv entered = r->falloff * transmit(m->shading_diffuse, r->nl);
     floatv lit = r->falloff * r->visibility * fmax(r->nl, 0.0f);
     floatv front = entered * r->visibility * fmax(r->nl, 0.0f);
+    RL_UNROLL
     for (int c = 0; c < 3; c++) {
         floatv e = front;
         if (scattered)
@@ -44,11 +45,13 @@ static inline void add_point(constant material_t *m, const surface_t *s, constan
     if (transmits && rl_any(r->nl < 0.0f)) {
         floatv back = fmax(-r->nl, 0.0f), t[3];
         through(m, s, r, back, t);
+        RL_UNROLL
         for (int c = 0; c < 3; c++)
             diffuse[c] += light->intensity[c] * (entered * back * t[c]);
     }
     if (m->shading_specular == GGX && rl_any(lit > 0.0f)) {
         floatv fresnel, dv = lit * lobe(s, r, s->roughness, &fresnel);
+        RL_UNROLL
         for (int c = 0; c < 3; c++) {
             floatv f0 = mix(s->specular, s->albedo[c], s->metallic);
             specular[c] += light->intensity[c] * dv * fma(1.0f - f0, fresnel, f0);
@@ -107,6 +110,7 @@ static inline floatv given(float own, int has_layer, global const float *layer, 
 static inline void shade(constant material_t *m, surface_t *s, const source_t *from, int x, int y, floatv *diffuse, floatv *lit)
 {
     floatv sum[3] = {0.0f, 0.0f, 0.0f};
+    RL_UNROLL
     for (int c = 0; c < 3; c++)
         lit[c] = diffuse[c] = 0.0f;
     sum_lights(m, s, from, x, y, sum, lit);
@@ -115,6 +119,7 @@ static inline void shade(constant material_t *m, surface_t *s, const source_t *f
     floatv scale = (1.0f / RL_PI) * (1.0f - s->metallic);
     if (!m->has_profile || m->shading_exit_transmission == EXIT_IN_LIGHTING)
         scale *= transmit(m->shading_diffuse, s->nv);
+    RL_UNROLL
     for (int c = 0; c < 3; c++) {
         if (!m->has_profile || scatters(m))
             lit[c] = fma(sum[c] * scale, s->albedo[c], lit[c]);
@@ -141,10 +146,12 @@ kernel void lighting(LIGHTING_PORTS)
     uint now = rl_max_id(id);
     floatv out_diffuse[3], out_lit[3];
     surface_t s;
+    RL_UNROLL
     for (int c = 0; c < 3; c++)
         out_diffuse[c] = out_lit[c] = 0.0f;
     if (now) {
         s.z = rl_load(depth, at);
+        RL_UNROLL
         for (int c = 0; c < 3; c++) {
             s.albedo[c] = rl_load(albedo, at + c * f->plane);
             s.n[c] = rl_load(normal, at + c * f->plane);
@@ -163,6 +170,7 @@ kernel void lighting(LIGHTING_PORTS)
             scatter_surface(m, &s, f, curvature, smooth_normal, at);
         s.here = mask;
         shade(m, &s, &from, x, y, d, l);
+        RL_UNROLL
         for (int c = 0; c < 3; c++) {
             out_diffuse[c] = rl_select(out_diffuse[c], d[c], mask);
             if (HAS_emission)
@@ -172,6 +180,7 @@ kernel void lighting(LIGHTING_PORTS)
         id = select(id, (uintv)0, mask);
         now = rl_max_id(id);
     }
+    RL_UNROLL
     for (int c = 0; c < 3; c++) {
         RL_STORE(diffuse, c, x, y, out_diffuse[c]);
         rl_store(out_lit[c], lit, at + c * f->plane);
@@ -187,6 +196,7 @@ kernel void lighting_energy(LIGHTING_PORTS)
         int at = rl_index(f, x, y);
         floatv values[ENERGY_PIXELS];
         energy_clear(values);
+        RL_UNROLL
         for (int c = 0; c < 3; c++) {
             if (HAS_emission)
                 values[ENERGY_IN + c] = rl_load(emission, at + c * f->plane);

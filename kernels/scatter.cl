@@ -331,6 +331,7 @@ static inline void scatter_resolve_from(int layout, global const float *filtered
     floatv out = 1.0f;
     if (scatter_any(disney))
         out = rl_select(out, scatter_disney(scatter_n_dot_v(f, normal, x, y)), disney);
+    RL_UNROLL
     for (int c = 0; c < 3; c++) {
         floatv sum = rl_load(lit + c * f->plane, at);
         if (scatter_any(scatters)) {
@@ -391,6 +392,7 @@ static inline void scatter_account(floatv *out, int c, floatv own, float share, 
 
 /* A result's part of the ledger, of the pixels at `at`; planes are `plane` floats apart. */
 #define SCATTER_KEEP_LEDGER(out, plane, at)                                                                  \
+    RL_UNROLL
     for (int c = 0; c < 3; c++) {                                                                            \
         rl_vstore((out)[3 + c], 0, border + c * (plane) + (at));                                             \
         rl_vstore((out)[6 + c], 0, off_screen + c * (plane) + (at));                                         \
@@ -420,6 +422,7 @@ static inline void scatter_energy(int layout, global const float *const *parts, 
             floatv out = 1.0f, values[ENERGY_PIXELS];
             if (mat->shading_diffuse == DIFFUSE_DISNEY && mat->shading_exit_transmission == EXIT_SSS)
                 out = scatter_disney(scatter_n_dot_v(f, normal, x, y));
+            RL_UNROLL
             for (int c = 0; c < 3; c++) {
                 floatv a = rl_load(albedo + c * f->plane, at);
                 a = out * (mat->profile_texturing == TEXTURING_PRE_POST ? sqrt(a) : a);

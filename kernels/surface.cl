@@ -65,6 +65,7 @@ static inline void view_surface(surface_t *s, constant frame_t *f, int x, int y)
     widest py = (widest)(y + f->origin[1]) + 0.5f + c->jitter[1];
     widest ry = (c->centre[1] - py) / c->focal[1];
     widev nw = 0;
+    RL_UNROLL
     for (int i = 0; i < 3; i++) {
         widev w = rx * c->to_world[4 * i] + (ry * c->to_world[4 * i + 1] - c->to_world[4 * i + 2]);
         s->wide_n[i] = to_widev(s->n[i]);
@@ -73,6 +74,7 @@ static inline void view_surface(surface_t *s, constant frame_t *f, int x, int y)
     }
     s->nw = nw * to_widev(s->z);
     floatv inverse = rsqrt(dot3(s->w, s->w));
+    RL_UNROLL
     for (int i = 0; i < 3; i++)
         s->v[i] = -s->w[i] * inverse;
     s->nv = to_narrow(-nw) * inverse;
@@ -91,6 +93,7 @@ static inline void aim(ray_t *r, const surface_t *s, constant light_t *light, co
 {
     widev nl = 0;
     if (light->type == LIGHT_DIRECTIONAL) {
+        RL_UNROLL
         for (int i = 0; i < 3; i++) {
             r->l[i] = -light->direction[i];
             nl = s->wide_n[i] * -(widest)light->direction[i] + nl;
@@ -100,12 +103,14 @@ static inline void aim(ray_t *r, const surface_t *s, constant light_t *light, co
         return;
     }
     nl = -s->nw;
+    RL_UNROLL
     for (int i = 0; i < 3; i++) {
         widest from_camera = (widest)light->position[i] - c->to_world[4 * i + 3];
         r->l[i] = fma(-s->z, s->w[i], (floatv)(float)from_camera);
         nl = s->wide_n[i] * from_camera + nl;
     }
     floatv inverse = rsqrt(fmax(dot3(r->l, r->l), 1e-12f)); /* a light on the surface stays finite */
+    RL_UNROLL
     for (int i = 0; i < 3; i++)
         r->l[i] *= inverse;
     r->nl = to_narrow(nl) * inverse;
