@@ -167,6 +167,7 @@ kernel void taa(TAA_PORTS)
     int x = RL_W * (int)get_global_id(0), y = (int)get_global_id(1), at = rl_index(f, x, y);
     history_t h = {last_color, last_depth, last_count, last_stencil};
     floatv own[3], count = 1.0f;
+    RL_UNROLL
     for (int c = 0; c < 3; c++)
         own[c] = rl_load(color, at + c * f->plane);
     floatv result[3] = {own[0], own[1], own[2]};
@@ -200,6 +201,7 @@ kernel void taa(TAA_PORTS)
             n = rl_select(fabs(n), fmin(fabs(n), RESAMPLED_FRAMES), (tx != 0.0f) | (ty != 0.0f));
             n = rl_select(n, fmin(n, EDGE_FRAMES), place.edge & ~still);
             if (whole)
+                RL_UNROLL
                 for (int c = 0; c < 3; c++)
                     past[c] = tap(h.color + c * f->plane, f, hx, hy);
             else
@@ -212,9 +214,11 @@ kernel void taa(TAA_PORTS)
             floatv alpha = fmax(1.0f / (1.0f + n), p->blend);
             floatv w = alpha * firefly_weight(&box, own), w_past = (1.0f - alpha) * firefly_weight(&box, past);
             floatv share = w / (w + w_past);
+            RL_UNROLL
             for (int c = 0; c < 3; c++)
                 result[c] = rl_select(result[c], fma(own[c] - past[c], share, past[c]), mask);
 #if WANTS_energy
+            RL_UNROLL
             for (int c = 0; c < 3; c++) {
                 cut[c] = rl_select(cut[c], (past[3 + c] - past[c]) * (1.0f - share), mask);
                 brought[c] = rl_select(brought[c], (past[3 + c] - own[c]) * (1.0f - share), mask);
@@ -224,10 +228,12 @@ kernel void taa(TAA_PORTS)
             count = rl_select(count, rl_select(n, -n, place.follows), mask);
         }
     }
+    RL_UNROLL
     for (int c = 0; c < 3; c++)
         rl_store(result[c], out_color, at + c * f->plane);
     rl_store(count, out_count, at);
 #if WANTS_energy
+    RL_UNROLL
     for (int c = 0; c < 3; c++) {
         rl_store(cut[c], clamped, at + c * f->plane);
         rl_store(brought[c], redistributed, at + c * f->plane);
@@ -248,6 +254,7 @@ kernel void taa_energy(TAA_PORTS)
         id = rl_load_id(stencil, at);
 #endif
         energy_clear(values);
+        RL_UNROLL
         for (int c = 0; c < 3; c++) {
             values[ENERGY_IN + c] = rl_load(color, at + c * f->plane);
             values[ENERGY_OUT + c] = rl_load(out_color, at + c * f->plane);

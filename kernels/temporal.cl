@@ -49,15 +49,18 @@ static inline void colour_box(box_t *b, constant frame_t *f, global const float 
         if (i == 4)
             continue;
         floatv d[3], v[3];
+        RL_UNROLL
         for (int c = 0; c < 3; c++)
             d[c] = tap(color + c * f->plane, f, x + i % 3 - 1, y + i / 3 - 1) - own[c];
         to_ycocg(d, v);
         brightest = fmax(brightest, v[0] + own_y[0]);
+        RL_UNROLL
         for (int c = 0; c < 3; c++) {
             sum[c] += v[c];
             squares[c] = fma(v[c], v[c], squares[c]);
         }
     }
+    RL_UNROLL
     for (int c = 0; c < 3; c++) {
         floatv mean = sum[c] * (1.0f / 9);
         floatv reach = gamma * sqrt(fmax(fma(-mean, mean, squares[c] * (1.0f / 9)), 0.0f));
@@ -72,17 +75,21 @@ static inline void colour_box(box_t *b, constant frame_t *f, global const float 
 static inline void clip_to_box(const box_t *b, const floatv *own, floatv *history)
 {
     floatv d[3], v[3], out = 1.0f;
+    RL_UNROLL
     for (int c = 0; c < 3; c++)
         d[c] = history[c] - own[c];
     to_ycocg(d, v);
+    RL_UNROLL
     for (int c = 0; c < 3; c++) {
         v[c] -= b->middle[c];
         out = fmax(out, fabs(v[c]) / b->half_width[c]);
     }
     intv outside = out > 1.0f;
+    RL_UNROLL
     for (int c = 0; c < 3; c++)
         v[c] = v[c] / out + b->middle[c];
     from_ycocg(v, d);
+    RL_UNROLL
     for (int c = 0; c < 3; c++)
         history[c] = rl_select(history[c], own[c] + d[c], outside); /* inside: untouched */
 }
@@ -155,6 +162,7 @@ static inline void resample(constant frame_t *f, global const float *color, int 
     floatv wx[6], wy[6];
     spline36(tx, wx);
     spline36(ty, wy);
+    RL_UNROLL
     for (int c = 0; c < 3; c++) {
         floatv sum = 0.0f, least = 0.0f;
 #pragma unroll
