@@ -78,28 +78,45 @@ static size_t pack_coded(const rl_exr_deflater *de, const exr_chunk_info_t *chun
     return clamped;
 }
 
+/* The output must depend on nothing but the chunk. ISA-L's init leaves the window's size (hist_bits) as it
+ * finds it, so all is cleared. And levels 1 and 2 of 2.30 put bits 16 to 47 of the stream's address where the
+ * hash of the bytes from the third on belongs, when their fast loop codes a stream's first byte
+ * (isal_deflate_icf_body_hash_hist: a register is hashed that is not loaded yet): about one chunk in ten
+ * thousand is coded otherwise at another address. The loop leaves the last 16 bytes of what it is given to
+ * another one, which does not; so the first 16 go ahead, and are flushed. That takes 8 bytes a chunk. */
+#define AHEAD 16
+
+static size_t compress_isal(rl_exr_deflater *de, uint32_t size)
+{
+    struct isal_zstream *s = de->stream;
+    uint32_t ahead = size < AHEAD ? size : AHEAD;
+    memset(s, 0, sizeof *s);
+    memset(de->level_buffer, 0, ISAL_DEF_LVL1_REQ);
+    memset(de->coded + size, 0, LOOK_AHEAD);
+    isal_deflate_init(s);
+    s->gzip_flag = IGZIP_ZLIB;
+    s->level = 1;
+    s->level_buf = de->level_buffer;
+    s->level_buf_size = ISAL_DEF_LVL1_DEFAULT;
+    s->next_in = de->coded;
+    s->next_out = de->packed;
+    s->avail_out = size - 1;
+    s->avail_in = ahead;
+    s->flush = SYNC_FLUSH;
+    if (isal_deflate(s) != COMP_OK || s->avail_in > 0)
+        return 0;
+    s->avail_in = size - ahead;
+    s->flush = NO_FLUSH;
+    s->end_of_stream = 1;
+    return isal_deflate(s) == COMP_OK && s->internal_state.state == ZSTATE_END ? s->total_out : 0;
+}
+
 /* Compresses `size` bytes of de->coded into de->packed; 0 when the result would not be smaller. */
 static size_t compress_zip(rl_exr_deflater *de, size_t size)
 {
     if (de->deflate)
         return libdeflate_zlib_compress(de->deflate, de->coded, size, de->packed, size - 1);
-    struct isal_zstream *s = de->stream;
-    /* The output must depend on nothing but the chunk. ISA-L's init leaves the window's size (hist_bits) as
-     * it finds it; the tables and what is looked at behind the input are its or ours to clear. */
-    memset(s, 0, sizeof *s);
-    memset(de->level_buffer, 0, ISAL_DEF_LVL1_REQ);
-    memset(de->coded + size, 0, LOOK_AHEAD);
-    isal_deflate_stateless_init(s);
-    s->gzip_flag = IGZIP_ZLIB;
-    s->level = 1;
-    s->level_buf = de->level_buffer;
-    s->level_buf_size = ISAL_DEF_LVL1_DEFAULT;
-    s->end_of_stream = 1;
-    s->next_in = de->coded;
-    s->avail_in = (uint32_t)size;
-    s->next_out = de->packed;
-    s->avail_out = (uint32_t)(size - 1);
-    return isal_deflate_stateless(s) == COMP_OK && s->avail_in == 0 ? s->total_out : 0;
+    return compress_isal(de, (uint32_t)size);
 }
 
 static rl_code ensure_zip(rl_exr_deflater *de, const exr_chunk_info_t *chunk, rl_error *err)
