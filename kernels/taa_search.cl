@@ -5,7 +5,7 @@
 #if !HAS_motion
 
 #define REACH        8                      /* pixels that are searched, to each side */
-#define USUAL_BEND   0.3f                   /* pixels that the displacement changes from the middle of a tile to its side */
+#define USUAL_BEND   0.3f                   /* pixels that the displacement changes in half a tile, or in as much depth */
 #define TERMS        4                      /* of a displacement along x, and along y */
 #define UNKNOWNS     (2 * TERMS)
 #define TURNS        2                      /* of least squares */
@@ -123,7 +123,8 @@ static inline float search(const tile_t *t, float *s)
             normal[i][UNKNOWNS] -= i % TERMS ? noise / (usual * usual) * s[i] : 0.0f;
         }
         solve(normal, s);
-        int sx = (int)clamp(floor(s[0] + t->ox + 0.5f), -1.0f, 1.0f), sy = (int)clamp(floor(s[TERMS] + t->oy + 0.5f), -1.0f, 1.0f);
+        int sx = (int)clamp(floor(s[0] + t->ox + 0.5f), -1.0f, 1.0f);
+        int sy = (int)clamp(floor(s[TERMS] + t->oy + 0.5f), -1.0f, 1.0f);
         bx += sx;
         by += sy;
         s[0] = clamp(s[0] - (float)sx, -1.0f, 1.0f);

@@ -30,7 +30,7 @@ typedef struct tile_t {
     floatv dx[TILE_N], dy[TILE_N], then[TILE_N];     /* by the camera: displacement, previous depth */
     floatv green[TILE_N], gx[TILE_N], gy[TILE_N];    /* and its slopes, a pixel */
     float lanes, slopes;                             /* number of inner lanes, sum of their squared slopes */
-    float middle, relief;                            /* their mean previous depth; half tiles that a unit of depth is wide there */
+    float middle, relief;                            /* their mean previous depth; half tiles a unit of depth */
 } tile_t;
 
 static inline float sum_lanes(floatv v)
