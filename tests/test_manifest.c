@@ -569,7 +569,7 @@ static void test_bad_lights(void **state)
         {"{type: point, position: [0, 0, 0], intensity: 1, direction: [0, 0, 1]}",
          "light 'k': a point light has no 'direction' without 'ies'"},
         {"{type: directional, direction: [0, 0, 0], lux: 1}",
-         "light 'k': the direction has no usable length"},
+         "light 'k': 'direction' has no usable length"},
         {"{type: spot, position: [0, 0, 0], direction: [0, 0, 1], intensity: 1}",
          "light 'k': a spot light needs 'angle' (full, degrees)"},
         {"{type: spot, position: [0, 0, 0], direction: [0, 0, 1], angle: 180, intensity: 1}",
