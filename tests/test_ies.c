@@ -85,8 +85,8 @@ static void tables_repeat_the_file(void **state)
     assert_near(rl_ies_integral(ies, 0.4), 2 * pi * (1 - cos(0.4)), 1e-5);
 }
 
-/* What stands behind the ballast factor: the ballast-lamp factor until 1995, "future use" in 2002, and in 2019
- * how the file was made (1.1: in an accredited laboratory). */
+/* What stands behind the ballast factor: the ballast-lamp factor until 1995, "future use" in 2002, and in
+ * 2019 how the file was made (1.1: in an accredited laboratory). */
 static void editions_differ(void **state)
 {
     static const struct {
@@ -137,7 +137,8 @@ static void bad_files_say_where(void **state)
         {HEAD "1 1 1 2 1 1 2 0 0 0\n1 1 9\n0 90\n0\n0 0", 9, "no candela value is above 0"},
         {HEAD "1 1 1e200 2 1 1 2 0 0 0\n1 1 9\n0 90\n0\n0 1e200", 9,
          "the largest candela times the multiplier: expected at most 1e30, found inf"},
-        {HEAD "1 1 1 1e300 1 1 2 0 0 0\n", 5, "the number of vertical angles: expected 1 to 2048, found 1e+300"},
+        {HEAD "1 1 1 1e300 1 1 2 0 0 0\n", 5,
+         "the number of vertical angles: expected 1 to 2048, found 1e+300"},
         {HEAD "1 1 1 2 1 1 2 0 0 0\n0 1 9\n", 6, "the ballast factor: expected above 0, found 0"},
         {HEAD "1 1 1 2 1 1 2 0 0 0\n1 -2 9\n", 6, "the ballast-lamp factor: expected at least 0, found -2"},
     };
@@ -328,10 +329,8 @@ static int clean(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(tables_repeat_the_file),
-        cmocka_unit_test(editions_differ),
-        cmocka_unit_test(bad_files_say_where),
-        cmocka_unit_test(units_agree),
+        cmocka_unit_test(tables_repeat_the_file), cmocka_unit_test(editions_differ),
+        cmocka_unit_test(bad_files_say_where),    cmocka_unit_test(units_agree),
         cmocka_unit_test(kernel_looks_up),
     };
     return cmocka_run_group_tests(tests, NULL, clean);

@@ -9,8 +9,8 @@
 
 static const double pi = 3.14159265358979323846;
 
-#define RL_LIGHT_FARTHEST   1e12 /* m, along an axis */
-#define RL_LIGHT_BRIGHTEST  1e30 /* of what kernels are told; floats end at 3e38 */
+#define RL_LIGHT_FARTHEST  1e12 /* m, along an axis */
+#define RL_LIGHT_BRIGHTEST 1e30 /* of what kernels are told; floats end at 3e38 */
 
 const char *const rl_light_unit_names[] = {"intensity", "irradiance", "radiance", "power",
                                            "candela",   "lumen",      "lux",      "luminance"};
@@ -211,9 +211,9 @@ static rl_code check_brightness(const rl_value *v, const rl_light_spec *l, rl_er
             return rl_fail(err, RL_E_CONFIG, v->where,
                            "light '%s' is too bright: %g %s, at most %g can be computed with", l->name,
                            area > 0 ? rgb[c] / area : rgb[c],
-                           area > 0                            ? "W/(sr m2)"
+                           area > 0                          ? "W/(sr m2)"
                            : l->type == RL_LIGHT_DIRECTIONAL ? "W/m2"
-                                                               : "W/sr",
+                                                             : "W/sr",
                            RL_LIGHT_BRIGHTEST);
     return RL_OK;
 }

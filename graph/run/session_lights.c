@@ -52,9 +52,9 @@ static rl_code no_such_shadow(const rl_manifest *m, const rl_light_spec *light, 
         if (m->layers[i].id == RL_LAYER_SHADOW)
             names[n++] = m->layers[i].light;
     rl_suggest(&text, light->shadow_layer, names, n, "known");
-    rl_code code =
-        rl_fail(err, RL_E_CONFIG, light->shadow_where, "light '%s': the capture '%s' has no layer 'shadow.%s'%s",
-                light->name, m->name, light->shadow_layer, rl_str_text(&text));
+    rl_code code = rl_fail(err, RL_E_CONFIG, light->shadow_where,
+                           "light '%s': the capture '%s' has no layer 'shadow.%s'%s", light->name, m->name,
+                           light->shadow_layer, rl_str_text(&text));
     rl_str_free(&text);
     return code;
 }
