@@ -345,6 +345,46 @@ static void furnace(void **state)
     folder_remove(folder);
 }
 
+/* ---- --resume ---- */
+
+static void run_to(const char *folder, const char *says)
+{
+    char *pipe = path_in(folder, "p.yaml");
+    tool_result r = RUN("run", pipe, "--out", folder, "--resume");
+    if (r.status || !strstr(r.err, says))
+        fail_msg("'%s' is not in\n%s", says, r.err);
+    tool_result_free(&r);
+    free(pipe);
+}
+
+/* Pictures of another lamp or another sky are not kept, though the pipeline's text is the same. */
+static void changed_files_are_noticed(void **state)
+{
+    static const char text[] =
+        "relit: 1\ncapture: capture.yaml\nmaterials: {default: {}}\n"
+        "shading: {diffuse: lambert, specular: none}\n"
+        "ambient: {hdri: sky.exr, up: y, specular: false}\n"
+        "lights:\n  a: {type: point, position: [2, 2, -28], direction: [0, -1, 0], ies: lamp.ies}\n"
+        "graph: {light: {pass: lighting}}\n"
+        "outputs: {out: {image: light.lit, file: 'o.{frame}.exr'}}\n",
+                      lamp[] = "IESNA91\nTILT=NONE\n1 -1 1 2 1 1 2 0 0 0\n1 1 9\n0 90\n0\n100 10\n";
+    char *folder = folder_new(), *other = text_replace(lamp, "100 10", "100 20");
+    (void)state;
+    write_capture(folder, identity);
+    write_sky(folder, 64, 32, 0.75f);
+    file_write(folder, "p.yaml", text, strlen(text));
+    file_write(folder, "lamp.ies", lamp, strlen(lamp));
+    run_to(folder, "2 frames, 2 files");
+    run_to(folder, "2 frames are there already");
+    file_write(folder, "lamp.ies", other, strlen(other));
+    run_to(folder, "they are made again");
+    run_to(folder, "2 frames are there already");
+    write_sky(folder, 64, 32, 0.5f);
+    run_to(folder, "they are made again");
+    free(other);
+    folder_remove(folder);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -352,6 +392,7 @@ int main(void)
         cmocka_unit_test(camera_space),
         cmocka_unit_test(spheres_and_lamps),
         cmocka_unit_test(furnace),
+        cmocka_unit_test(changed_files_are_noticed),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
