@@ -345,6 +345,31 @@ static void furnace(void **state)
     folder_remove(folder);
 }
 
+/* An HDRI that does not fit the memory limit is not decoded: this one claims much, and holds nothing. */
+static void sky_within_limit(void **state)
+{
+    static const char hdr[] = "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 8192 +X 16384\n",
+                      text[] = "relit: 1\ncapture: capture.yaml\nmaterials: {default: {}}\n"
+                               "ambient: {hdri: sky.hdr, up: y}\n"
+                               "graph: {light: {pass: lighting}}\n"
+                               "outputs: {out: {image: light.lit, file: 'o.{frame}.exr'}}\n",
+                      says[] = "p.yaml:4:17: error: the hdri '";
+    (void)state;
+    char *folder = folder_new(), *pipe = path_in(folder, "p.yaml"), *out = path_in(folder, "out");
+    write_capture(folder, identity);
+    file_write(folder, "sky.hdr", hdr, strlen(hdr));
+    file_write(folder, "p.yaml", text, strlen(text));
+    tool_result r = RUN("run", pipe, "--out", out, "--memory-limit", "500M");
+    if (r.status != 2 || !strstr(r.err, says) ||
+        !strstr(r.err, "has 16384 x 8192 pixels of 3 channels, which take 3.0 GiB to read"))
+        fail_msg("%d: %s", r.status, r.err);
+    assert_int_equal(folder_files(out), 0);
+    tool_result_free(&r);
+    free(out);
+    free(pipe);
+    folder_remove(folder);
+}
+
 /* ---- --resume ---- */
 
 static void run_to(const char *folder, const char *says)
@@ -392,6 +417,7 @@ int main(void)
         cmocka_unit_test(camera_space),
         cmocka_unit_test(spheres_and_lamps),
         cmocka_unit_test(furnace),
+        cmocka_unit_test(sky_within_limit),
         cmocka_unit_test(changed_files_are_noticed),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -49,7 +49,7 @@ static rl_code add_hdri(rl_session *s, rl_ambient *a, const float m[9], rl_error
 {
     rl_image_file file = {0};
     rl_error why = {0};
-    rl_code code = rl_image_file_read(a->hdri, &file, &why);
+    rl_code code = rl_image_file_read_within(a->hdri, s->options.memory_limit, &file, &why);
     if (code)
         return rl_fail(err, code, a->hdri_where, "the hdri '%s' %s", a->hdri, why.text);
     size_t plane = (size_t)file.width * (size_t)file.height;
