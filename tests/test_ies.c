@@ -123,6 +123,8 @@ static void bad_files_say_where(void **state)
         {"IESNA91\n[TEST]\n", 3, "expected a line 'TILT=NONE', found the end of the file"},
         {"IESNA91\n\nTILT=INCLUDE\n1\n", 3, "TILT=INCLUDE: only files with TILT=NONE can be used"},
         {HEAD "1 1000 x\n", 5, "expected the candela multiplier, found 'x'"},
+        {HEAD "1 1000 1\xb0 3\n", 5, "expected the candela multiplier, found '1?'"}, /* no UTF-8 */
+        {HEAD "1 1000 1\xc2\xb0 3\n", 5, "expected the candela multiplier, found '1°'"},
         {HEAD "1 1000 0\n", 5, "the candela multiplier: expected above 0, found 0"},
         {HEAD "1 1000 1 0.5 1 1\n", 5, "the number of vertical angles: expected 1 to 2048, found 0.5"},
         {HEAD "1 1000 1\n2 1\n3 2 0 0 0 1 1 9\n", 7, "photometric type 3 (A): only type C (1) can be used"},
