@@ -48,6 +48,18 @@ typedef struct row {
 
 /* clang-format off */
 static const row rows[] = {
+    /* lights */
+    {"shadow that is neither a layer nor a word", "intensity: 2.2", "intensity: 2.2, shadow: screem", .at = "screem}", .says = {"did you mean 'screen'?", "known: fill, key, none, rim, screen"}},
+    {"light in an unknown colour space", "intensity: 2.2", "intensity: 2.2, colorspace: lin_rec70", .at = "lin_rec70}", .says = {"did you mean 'lin_rec709'?"}},
+    {"light too far for floats", "position: [-0.5,", "position: [1e300,", .at = "[1e300", .says = {"'key'", "more than 1e+12 m away"}},
+    {"light too bright for floats", "intensity: 2.2", "intensity: [1, 1e31, 1]", .at = "{type: point", .says = {"'key'", "too bright", "1e+31 W/sr", "1e+30"}},
+    {"area light too bright for floats", "type: point, position: [-0.5, -0.52, 0.47], intensity: 2.2", "type: sphere, radius: 1e-5, position: [0, 0, 0], intensity: 1e29", .at = "{type: sphere", .says = {"too bright", "W/(sr m2)"}},
+    {"exposure too bright for floats", "intensity: 2.2", "intensity: 1e20, exposure: 64", .at = "{type: point", .says = {"too bright"}},
+    {"no such ies file", "intensity: 2.2", "direction: [0, 0, -1], ies: no.ies", .at = "no.ies", .says = {"light 'key': the ies file '", "no.ies' cannot be opened: No such file"}},
+    {"ies file without a name", "intensity: 2.2", "direction: [0, 0, -1], ies: ''", .at = "''}", .says = {"the ies file '", "cannot be"}},
+    {"no such hdri", NULL, "ambient: {hdri: no.hdr, up: z}\n", .at = "no.hdr", .says = {"the hdri '", "no.hdr' cannot be read: No such file"}},
+    {"hdri that is no picture", NULL, "ambient: {hdri: capture.yaml, up: z}\n", .at = "capture.yaml, up", .says = {"the hdri '", "is not an image"}},
+    {"ambient light too bright for floats", NULL, "ambient: {sh: [3e38, 0, 0, 0, 0, 0, 0, 0, 0], intensity: 100}\n", .at = "{sh:", .says = {"ambient light is too bright", "1e+30"}},
     /* names */
     {"unknown key", "materials:", "materails:", .at = "materails", .says = {"'materails'", "did you mean 'materials'?"}},
     {"unknown pass", "sss_burley", "sss_burly", .at = "sss_burly", .says = {"did you mean 'sss_burley'?"}},
@@ -57,7 +69,7 @@ static const row rows[] = {
     {"unknown layer in the manifest", "roughness: {", "roughnes: {", true, "roughnes", .says = {"did you mean 'roughness'?"}},
     {"unknown image", "image: aa.color, file: \"{capture}.{frame:04}.exr\"", "image: aa.colour, file: \"{capture}.{frame:04}.exr\"", .at = "aa.colour", .says = {"'aa.colour'", "did you mean 'color'?"}},
     {"unknown image of an input", "color: sss.color", "color: ssss.color", .at = "ssss.color", .says = {"'ssss.color'", "did you mean 'sss'?"}},
-    {"unknown light of a shadow layer", "intensity: 2.2", "intensity: 2.2, shadow: rimm", .at = "key: {type", .says = {"'key'", "shadow.rimm", "did you mean 'rim'?"}},
+    {"unknown light of a shadow layer", "intensity: 2.2", "intensity: 2.2, shadow: rimm", .at = "rimm}", .says = {"'key'", "shadow.rimm", "did you mean 'rim'?"}},
     {"unknown key of a light", "intensity: 2.2", "intensty: 2.2", .at = "intensty", .says = {"did you mean 'intensity'?"}},
     {"unknown profile", "profile: skin", "profile: skni", .at = "skni", .says = {"did you mean 'skin'?"}},
     {"unknown key of a profile", "scatter_distance_mm", "scatter_distance_m", .at = "scatter_distance_m", .says = {"did you mean 'scatter_distance_mm'?"}},

@@ -85,6 +85,29 @@ static void tables_repeat_the_file(void **state)
     assert_near(rl_ies_integral(ies, 0.4), 2 * pi * (1 - cos(0.4)), 1e-5);
 }
 
+/* What stands behind the ballast factor: the ballast-lamp factor until 1995, "future use" in 2002, and in
+ * 2019 how the file was made (1.1: in an accredited laboratory). */
+static void editions_differ(void **state)
+{
+    static const struct {
+        const char *head;
+        double candela;
+    } rows[] = {{"IESNA91", 5.5},
+                {"IESNA:LM-63-1995", 5.5},
+                {"IESNA:LM-63-2002", 5},
+                {"IES:LM-63-2019", 5},
+                {"\xef\xbb\xbfIESNA:LM-63-2002", 5}};
+    (void)state;
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++)
+        for (int crlf = 0; crlf < 2; crlf++) {
+            char text[256];
+            snprintf(text, sizeof text,
+                     "%s%s[MANUFAC] L\xe4mp\nTILT=NONE\n1 -1 1 2 1 1 2 0 0 0\n1 1.1 9\n0 90\n0\n5 0\n",
+                     rows[i].head, crlf ? "\r\n" : "\n");
+            assert_near(parse(text)->candela, rows[i].candela, 1e-9);
+        }
+}
+
 static void bad_files_say_where(void **state)
 {
     static const struct {
@@ -92,11 +115,17 @@ static void bad_files_say_where(void **state)
         int line;
         const char *what;
     } rows[] = {
-        {"LM-63\n", 1, "not a photometric file: its first line is not 'IESNA…' (LM-63-1991 or later)"},
+        {"LM-63\n", 1,
+         "not a photometric file: its first line is not 'IESNA…' or 'IES:…' (LM-63-1991 or later), but "
+         "'LM-63'"},
+        {"", 1,
+         "not a photometric file: its first line is not 'IESNA…' or 'IES:…' (LM-63-1991 or later), but ''"},
         {"IESNA91\n[TEST]\n", 3, "expected a line 'TILT=NONE', found the end of the file"},
         {"IESNA91\n\nTILT=INCLUDE\n1\n", 3, "TILT=INCLUDE: only files with TILT=NONE can be used"},
         {HEAD "1 1000 x\n", 5, "expected the candela multiplier, found 'x'"},
-        {HEAD "1 1000 0\n", 5, "the candela multiplier is not above 0"},
+        {HEAD "1 1000 1\xb0 3\n", 5, "expected the candela multiplier, found '1?'"}, /* no UTF-8 */
+        {HEAD "1 1000 1\xc2\xb0 3\n", 5, "expected the candela multiplier, found '1°'"},
+        {HEAD "1 1000 0\n", 5, "the candela multiplier: expected above 0, found 0"},
         {HEAD "1 1000 1 0.5 1 1\n", 5, "the number of vertical angles: expected 1 to 2048, found 0.5"},
         {HEAD "1 1000 1\n2 1\n3 2 0 0 0 1 1 9\n", 7, "photometric type 3 (A): only type C (1) can be used"},
         {HEAD "1 1 1 2 1 1 2 0 0 0\n1 1 9\n90 0\n", 7, "vertical angles do not rise: 0 follows 90"},
@@ -106,8 +135,14 @@ static void bad_files_say_where(void **state)
          "horizontal angles from 0 to 60: of type C they are 0, or go from 0 to 90, 180 or 360 or from 90 to "
          "270"},
         {HEAD "1 1 1 2 1 1 2 0 0 0\n1 1 9\n0 90\n0\n4\n", 10, "expected candela, found the end of the file"},
-        {HEAD "1 1 1 2 1 1 2 0 0 0\n1 1 9\n0 90\n0\n4 -1\n", 9, "candela below 0"},
+        {HEAD "1 1 1 2 1 1 2 0 0 0\n1 1 9\n0 90\n0\n4 -1\n", 9, "candela: expected at least 0, found -1"},
         {HEAD "1 1 1 2 1 1 2 0 0 0\n1 1 9\n0 90\n0\n0 0", 9, "no candela value is above 0"},
+        {HEAD "1 1 1e200 2 1 1 2 0 0 0\n1 1 9\n0 90\n0\n0 1e200", 9,
+         "the largest candela times the multiplier: expected at most 1e30, found inf"},
+        {HEAD "1 1 1 1e300 1 1 2 0 0 0\n", 5,
+         "the number of vertical angles: expected 1 to 2048, found 1e+300"},
+        {HEAD "1 1 1 2 1 1 2 0 0 0\n0 1 9\n", 6, "the ballast factor: expected above 0, found 0"},
+        {HEAD "1 1 1 2 1 1 2 0 0 0\n1 -2 9\n", 6, "the ballast-lamp factor: expected at least 0, found -2"},
     };
     (void)state;
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
@@ -296,9 +331,8 @@ static int clean(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(tables_repeat_the_file),
-        cmocka_unit_test(bad_files_say_where),
-        cmocka_unit_test(units_agree),
+        cmocka_unit_test(tables_repeat_the_file), cmocka_unit_test(editions_differ),
+        cmocka_unit_test(bad_files_say_where),    cmocka_unit_test(units_agree),
         cmocka_unit_test(kernel_looks_up),
     };
     return cmocka_run_group_tests(tests, NULL, clean);

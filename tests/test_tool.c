@@ -473,12 +473,12 @@ static void test_init(void **state)
     free(manifest);
 }
 
-/* What is commented must be right too: with every comment of a whole line taken out it still checks. */
-static void test_init_uncommented(void **state)
+/* What is commented must be right too: with every comment of a whole line taken out it still checks, and has
+ * these. */
+static void expect_uncommented_checks(const char *of, const char *const *has)
 {
-    (void)state;
     char *folder = folder_new(), *pipe = path_in(folder, "init.yaml");
-    tool_result r = RUN("init", capture);
+    tool_result r = RUN("init", of);
     expect(&r, 0);
     char *to = r.out;
     for (const char *from = r.out; *from; from++) {
@@ -488,13 +488,48 @@ static void test_init_uncommented(void **state)
     }
     *to = 0;
     file_write(folder, "init.yaml", r.out, strlen(r.out));
-    assert_non_null(strstr(r.out, "\nlights:\n"));
+    for (; *has; has++)
+        if (!strstr(r.out, *has))
+            fail_msg("no '%s' in\n%s", *has, r.out);
     tool_result_free(&r);
     r = RUN("check", pipe);
     expect(&r, 0);
+    assert_null(strstr(r.err, "warning")); /* the lights stand where they stood */
     tool_result_free(&r);
     free(pipe);
     folder_remove(folder);
+}
+
+static void test_init_uncommented(void **state)
+{
+    (void)state;
+    char *backlit = path_in(capture, "../backlit"), *made = folder_new(),
+         *path = path_in(capture, "capture.yaml");
+    expect_uncommented_checks(capture, (const char *const[]){"\nlights:\n", NULL});
+    expect_uncommented_checks(backlit,
+                              (const char *const[]){"pass: back_lighting", "back: behind.diffuse", NULL});
+    /* in centimetres, with a panel that has no shadow layer */
+    size_t size;
+    char *manifest = file_read(path, &size), frame[PATH_MAX + 32];
+    snprintf(frame, sizeof frame, "files: %s/monkey.####.exr", capture);
+    char *files = text_replace(manifest, "files: monkey.####.exr", frame);
+    char *unit = text_replace(files, "unit: m\n", "unit: cm\n");
+    char *lights =
+        text_replace(unit, "  key:  {type: point, position: [-0.5, -0.52, 0.47],",
+                     "  panel: {type: rect, position: [10, 20, 30.5], direction: [0, 0, -1], width: 12.5, "
+                     "height: 3, power: 4, temperature: 3000}\n  key:  {type: point, position: [-50, "
+                     "-52, 47],");
+    file_write(made, "capture.yaml", lights, strlen(lights));
+    expect_uncommented_checks(
+        made, (const char *const[]){"position: [10, 20, 30.5], direction: [0, 0, -1], width: 12.5, height: 3",
+                                    "temperature: 3000}\n", "position: [-50, -52, 47]", NULL});
+    free(lights);
+    free(unit);
+    free(files);
+    free(manifest);
+    free(path);
+    free(backlit);
+    folder_remove(made);
 }
 
 static void test_inspect(void **state)

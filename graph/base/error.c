@@ -1,5 +1,6 @@
 #include "graph/base/error.h"
 
+#include <stdbool.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -10,15 +11,29 @@ static void copy_tail(char *out, size_t size, const char *text)
     memcpy(out, from, strlen(from) + 1);
 }
 
+/* Bytes that follow the first of a character; 0 for a single byte, and for what is no UTF-8 (RFC 3629). */
+static size_t utf8_more(const unsigned char *c)
+{
+    size_t more = *c >= 0xc2 && *c < 0xe0 ? 1 : *c >= 0xe0 && *c < 0xf0 ? 2 : *c >= 0xf0 && *c < 0xf5 ? 3 : 0;
+    for (size_t i = 1; i <= more; i++)
+        if ((c[i] & 0xc0) != 0x80)
+            return 0;
+    bool overlong = (*c == 0xe0 && c[1] < 0xa0) || (*c == 0xf0 && c[1] < 0x90),
+         none = (*c == 0xed && c[1] > 0x9f) || (*c == 0xf4 && c[1] > 0x8f); /* surrogates, past the end */
+    return overlong || none ? 0 : more;
+}
+
 /* Names and values of users are quoted in messages: what would break the line or the terminal does not pass.
  */
 void rl_one_line(char *text)
 {
     for (unsigned char *c = (unsigned char *)text; *c; c++) {
+        size_t more = utf8_more(c);
         if (*c == '\n' || *c == '\t')
             *c = ' ';
-        else if (*c < ' ' || *c == 127)
+        else if (*c < ' ' || *c == 127 || (*c > 127 && !more))
             *c = '?';
+        c += more;
     }
 }
 

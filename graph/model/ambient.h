@@ -60,8 +60,9 @@ void rl_ambient_direction(const rl_ambient *a, double u, double v, double out[3]
 void rl_ambient_place(const rl_ambient *a, const double direction[3], double *u, double *v);
 
 /* Adds the projection of a latitude-longitude image (planes of width * height, linear) to sh, before
- * intensity: exact solid angles, harmonics at the pixels' centres, so that an even sky of h rows has an error
- * of 0.5/h^2 (1e-4 for 64). Samples that are not finite count as 0; their number is returned. */
+ * intensity: exact solid angles, harmonics at the pixels' centres, of coarse maps at those of at least 256
+ * rows of parts: an even sky has an error of 1e-5. Samples that are not finite count as 0; their number is
+ * returned. */
 unsigned long long rl_ambient_project(const rl_ambient *a, const float *const plane[3], int width, int height,
                                       double sh[RL_AMBIENT_BANDS][3]);
 

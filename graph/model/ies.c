@@ -9,11 +9,13 @@
 #include "graph/base/text.h"
 
 static const double pi = 3.14159265358979323846;
+static const double most_candela = 1e30;
 
 typedef struct reader {
     const char *at, *name;
     const char *start; /* of the line */
     int line, column;  /* of the word read last */
+    bool lamp_factor;  /* before 2002 */
     rl_arena *arena;
     rl_error *err;
 } reader;
@@ -27,6 +29,12 @@ typedef struct raw {
 static rl_code wrong(const reader *r, int line, const char *what)
 {
     return rl_fail(r->err, RL_E_FORMAT, (rl_where){r->name, line, r->column}, "%s", what);
+}
+
+static rl_code unfit(const reader *r, const char *what, double found, const char *expected)
+{
+    return rl_fail(r->err, RL_E_FORMAT, (rl_where){r->name, r->line, r->column}, "%s: expected %s, found %g",
+                   what, expected, found);
 }
 
 /* ---- words -----------------------------------------------------------------------------------------------
@@ -77,7 +85,7 @@ static rl_code read_count(reader *r, const char *what, int *out)
     if (!code && !(v >= 1 && v <= RL_IES_MOST_ANGLES && v == floor(v)))
         return rl_fail(r->err, RL_E_FORMAT, (rl_where){r->name, r->line, r->column},
                        "%s: expected 1 to %d, found %g", what, RL_IES_MOST_ANGLES, v);
-    *out = (int)v;
+    *out = code ? 0 : (int)v;
     return code;
 }
 
@@ -86,9 +94,15 @@ static rl_code read_count(reader *r, const char *what, int *out)
 
 static rl_code read_head(reader *r)
 {
+    if (!strncmp(r->at, "\xef\xbb\xbf", 3)) /* a byte order mark of some editors */
+        r->at += 3;
     const char *line = next_line(r);
-    if (!line || strncmp(line, "IESNA", 5))
-        return wrong(r, 1, "not a photometric file: its first line is not 'IESNA…' (LM-63-1991 or later)");
+    if (!line || (strncmp(line, "IESNA", 5) && strncmp(line, "IES:", 4)))
+        return rl_fail(r->err, RL_E_FORMAT, (rl_where){r->name, 1, 1},
+                       "not a photometric file: its first line is not 'IESNA…' or 'IES:…' (LM-63-1991 or "
+                       "later), but '%.40s'",
+                       line ? line : "");
+    r->lamp_factor = !strncmp(line, "IESNA91", 7) || strstr(line, "LM-63-199");
     while ((line = next_line(r)))
         if (!strncmp(line, "TILT=", 5))
             break;
@@ -113,7 +127,7 @@ static rl_code read_sizes(reader *r, raw *f, double *scale)
     if (!code)
         code = read_number(r, "the candela multiplier", &multiplier);
     if (!code && !(multiplier > 0))
-        code = wrong(r, r->line, "the candela multiplier is not above 0");
+        code = unfit(r, "the candela multiplier", multiplier, "above 0");
     if (!code)
         code = read_count(r, "the number of vertical angles", &f->vertical);
     if (!code)
@@ -130,14 +144,15 @@ static rl_code read_sizes(reader *r, raw *f, double *scale)
         code = read_number(r, i ? "a size of the lamp" : "the type of units", &skip);
     if (!code)
         code = read_number(r, "the ballast factor", &ballast);
+    if (!code && !(ballast > 0))
+        code = unfit(r, "the ballast factor", ballast, "above 0");
     if (!code)
         code = read_number(r, "the ballast-lamp factor", &factor);
-    if (!code && !(ballast > 0 && factor >= 0))
-        code = wrong(r, r->line, "the ballast factor is not above 0");
+    if (!code && !(factor >= 0))
+        code = unfit(r, "the ballast-lamp factor", factor, "at least 0");
     if (!code)
         code = read_number(r, "the watts", &skip);
-    *scale =
-        multiplier * ballast * (factor > 0 ? factor : 1); /* "future use", from 2002 on: 1, or 0 in some */
+    *scale = multiplier * ballast * (r->lamp_factor && factor > 0 ? factor : 1); /* 0 in some files */
     return code;
 }
 
@@ -192,12 +207,14 @@ static rl_code read_candela(reader *r, raw *f, double scale, double *most)
     for (size_t i = 0; i < n && !code; i++) {
         code = read_number(r, "candela", &f->candela[i]);
         if (!code && f->candela[i] < 0)
-            code = wrong(r, r->line, "candela below 0");
+            code = unfit(r, "candela", f->candela[i], "at least 0");
         f->candela[i] *= scale;
         *most = fmax(*most, f->candela[i]);
     }
-    if (!code && !(*most > 0 && isfinite(*most)))
+    if (!code && !(*most > 0))
         code = wrong(r, r->line, "no candela value is above 0");
+    if (!code && !(*most <= most_candela))
+        code = unfit(r, "the largest candela times the multiplier", *most, "at most 1e30");
     return code;
 }
 

@@ -1,9 +1,10 @@
-/* Photometric files, IESNA LM-63-1991 to 2019: how bright a lamp is in each direction.
+/* Photometric files, IES(NA) LM-63-1991 to 2019: how bright a lamp is in each direction.
  *
  * Type C photometry, TILT=NONE, one or more lamps. Vertical angles are 0 … 90, 90 … 180 or 0 … 180 degrees (0
  * is down); horizontal ones 0 alone (the same all around), 0 … 90 (four equal quarters), 0 … 180 or 90 … 270
  * (two equal halves), 0 … 360. Candela are multiplied by the file's multiplier, ballast factor and (before
- * 2002) ballast-lamp factor. What the file does not cover is dark. */
+ * 2002; 2019 has how the file was made in its place) ballast-lamp factor. What the file does not cover is
+ * dark. */
 #ifndef RL_MODEL_IES_H
 #define RL_MODEL_IES_H
 

@@ -9,6 +9,9 @@
 
 static const double pi = 3.14159265358979323846;
 
+#define RL_LIGHT_FARTHEST  1e12 /* m, along an axis */
+#define RL_LIGHT_BRIGHTEST 1e30 /* of what kernels are told; floats end at 3e38 */
+
 const char *const rl_light_unit_names[] = {"intensity", "irradiance", "radiance", "power",
                                            "candela",   "lumen",      "lux",      "luminance"};
 const char *const rl_light_type_names[] = {"point", "spot", "directional", "sphere", "rect"};
@@ -101,7 +104,7 @@ static rl_code read_direction(const rl_value *v, const char *key, const rl_light
     rl_code code = rl_value_numbers(v, key, 3, out, err);
     double length = hypot(hypot(out[0], out[1]), out[2]);
     if (!code && !(length > 1e-12 && length < 1e150))
-        return rl_fail(err, RL_E_CONFIG, v->where, "light '%s': the %s has no usable length", l->name, key);
+        return rl_fail(err, RL_E_CONFIG, v->where, "light '%s': '%s' has no usable length", l->name, key);
     for (int i = 0; i < 3 && !code; i++)
         out[i] /= length;
     return code;
@@ -135,6 +138,12 @@ static rl_code read_placement(const rl_value *v, double metres, rl_light_spec *l
             err, RL_E_CONFIG, v->where,
             "light '%s': with 'ies' it needs 'direction', where the file's vertical angle 0 points", l->name);
     rl_code code = position ? rl_value_numbers(position, "position", 3, l->position_m, err) : RL_OK;
+    for (int i = 0; i < 3 && !code; i++)
+        if (fabs(l->position_m[i] * metres) > RL_LIGHT_FARTHEST)
+            code = rl_fail(err, RL_E_CONFIG, position->where,
+                           "light '%s': the position is more than %g m away; a directional light is as far "
+                           "as one likes",
+                           l->name, RL_LIGHT_FARTHEST);
     if (!code && direction)
         code = read_direction(direction, "direction", l, l->direction, err);
     if (!code && (l->type == RL_LIGHT_RECT || rl_value_get(v, "ies")))
@@ -181,7 +190,32 @@ static rl_code read_ies(rl_arena *arena, const rl_value *v, rl_light_spec *l, rl
     if (!ies || code)
         return code;
     l->ies = rl_value_path(arena, ies);
-    return l->ies ? rl_ies_load(arena, l->ies, &l->profile, err) : rl_fail_memory(err, 0);
+    if (!l->ies)
+        return rl_fail_memory(err, 0);
+    rl_error why = {0}; /* what is in the file has its own place; that it cannot be read is said here */
+    code = rl_ies_load(arena, l->ies, &l->profile, &why);
+    if (code == RL_E_IO)
+        rl_fail(err, code, ies->where, "light '%s': the ies file '%s' %s", l->name, l->ies, why.text);
+    else if (code && err && !err->code)
+        *err = why;
+    return code;
+}
+
+/* Kernels compute with floats: what would not fit would be NaN in the picture. */
+static rl_code check_brightness(const rl_value *v, const rl_light_spec *l, rl_error *err)
+{
+    double rgb[3], area = rl_light_area(l);
+    rl_light_resolve(l, rgb);
+    for (int c = 0; c < 3; c++)
+        if (!(rgb[c] <= RL_LIGHT_BRIGHTEST && (!(area > 0) || rgb[c] / area <= RL_LIGHT_BRIGHTEST)))
+            return rl_fail(err, RL_E_CONFIG, v->where,
+                           "light '%s' is too bright: %g %s, at most %g can be computed with", l->name,
+                           area > 0 ? rgb[c] / area : rgb[c],
+                           area > 0                          ? "W/(sr m2)"
+                           : l->type == RL_LIGHT_DIRECTIONAL ? "W/m2"
+                                                             : "W/sr",
+                           RL_LIGHT_BRIGHTEST);
+    return RL_OK;
 }
 
 static rl_code read_spot(const rl_value *v, rl_light_spec *l, rl_error *err)
@@ -206,6 +240,7 @@ static rl_code read_shadow(const rl_value *v, rl_light_spec *l, rl_error *err)
     if (code)
         return code;
     l->shadow_named = shadow != NULL;
+    l->shadow_where = shadow ? shadow->where : l->where;
     l->shadow = !shadow || (strcmp(word, "none") && strcmp(word, "screen")) ? RL_SHADOW_LAYER
                 : word[0] == 's'                                            ? RL_SHADOW_SCREEN
                                                                             : RL_SHADOW_NONE;
@@ -222,14 +257,17 @@ static rl_code read_common(const rl_value *v, rl_light_spec *l, rl_error *err)
     l->enabled = true;
     l->efficacy = 683;
     l->colorspace = "lin_rec709";
+    l->colorspace_where = l->where;
     if ((x = rl_value_get(v, "enabled")))
         code = rl_value_truth(x, "enabled", &l->enabled, err);
     if (!code && (x = rl_value_get(v, "exposure")))
         code = rl_value_number(x, "exposure", -64, 64, &l->exposure, err);
     if (!code && (x = rl_value_get(v, "efficacy")))
         code = rl_value_number(x, "efficacy", DBL_MIN, 1e6, &l->efficacy, err);
-    if (!code && (x = rl_value_get(v, "colorspace")))
+    if (!code && (x = rl_value_get(v, "colorspace"))) {
+        l->colorspace_where = x->where;
         code = rl_value_text(x, "colorspace", &l->colorspace, err);
+    }
     if (!code && (x = rl_value_get(v, "space")))
         code = rl_value_word(x, "space", "world|camera", &space, err);
     l->in_camera_space = space == 1;
@@ -313,6 +351,8 @@ static rl_code read_light(rl_arena *arena, const rl_entry *e, double metres, rl_
     if (!code)
         code = read_amount(v, l, err);
     if (!code)
+        code = check_brightness(v, l, err);
+    if (!code)
         code = read_temperature(v, l, err);
     return code ? code : read_shadow(v, l, err);
 }
@@ -330,57 +370,4 @@ rl_code rl_lights_parse(rl_arena *arena, const rl_value *v, double metres, rl_li
         code = read_light(arena, &v->entries[i], metres, &out->light[i], err);
     out->n = code ? 0 : v->n;
     return code;
-}
-
-double rl_light_area(const rl_light_spec *spec)
-{
-    return spec->type == RL_LIGHT_SPHERE ? pi * spec->radius_m * spec->radius_m
-                                         : spec->width_m * spec->height_m;
-}
-
-/* Directions that a light of an intensity of 1 would have to fill evenly for its flux. */
-static double solid_angle(const rl_light_spec *spec)
-{
-    double s = sin(spec->angle / 4);
-    if (spec->profile)
-        return rl_ies_integral(spec->profile, spec->type == RL_LIGHT_SPOT ? spec->angle / 2 : pi);
-    if (spec->type == RL_LIGHT_RECT)
-        return spec->two_sided ? 2 * pi : pi;
-    /* 1 - cos(a/2) = 2 sin²(a/4), which does not cancel for narrow cones */
-    return spec->type == RL_LIGHT_SPOT ? 4 * pi * s * s : 4 * pi;
-}
-
-void rl_light_resolve(const rl_light_spec *spec, double out[3])
-{
-    double scale = exp2(spec->exposure);
-    if (!spec->has_amount)
-        scale *= spec->profile->candela / spec->efficacy;
-    else if (spec->unit >= RL_LIGHT_CANDELA)
-        scale /= spec->efficacy;
-    if (spec->unit == RL_LIGHT_POWER || spec->unit == RL_LIGHT_LUMEN)
-        scale /= solid_angle(spec);
-    if (spec->unit == RL_LIGHT_RADIANCE || spec->unit == RL_LIGHT_LUMINANCE)
-        scale *= rl_light_area(spec);
-    for (int c = 0; c < 3; c++)
-        out[c] = spec->amount[c] * scale;
-}
-
-void rl_light_axes(const rl_light_spec *spec, double side[3], double top[3])
-{
-    const double *d = spec->direction, *up = spec->up;
-    double along = up[0] * d[0] + up[1] * d[1] + up[2] * d[2], length = 0;
-    for (int i = 0; i < 3; i++) {
-        top[i] = up[i] - along * d[i];
-        length += top[i] * top[i];
-    }
-    for (int i = 0; i < 3; i++)
-        top[i] /= sqrt(length);
-    for (int i = 0; i < 3; i++)
-        side[i] = top[(i + 1) % 3] * d[(i + 2) % 3] - top[(i + 2) % 3] * d[(i + 1) % 3];
-}
-
-void rl_light_cone(const rl_light_spec *spec, double *cos_inner, double *cos_outer)
-{
-    *cos_outer = cos(spec->angle / 2);
-    *cos_inner = cos(spec->angle / 2 * (1 - spec->blend));
 }

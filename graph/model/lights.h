@@ -89,6 +89,7 @@ typedef struct rl_light_spec {
     double efficacy;        /* lm/W, > 0 */
     double exposure;        /* stops */
     const char *colorspace; /* of the amounts; default "lin_rec709" */
+    rl_where colorspace_where, shadow_where; /* of these values, of the light where there are none */
     rl_shadow shadow;
     const char *shadow_layer; /* RL_SHADOW_LAYER: the L of shadow.L */
     bool shadow_named;        /* false: it is the default, the light's own name, and may be absent */

@@ -265,7 +265,7 @@ static rl_code open_file(const char *path, const rl_oiio_module **module, rl_oii
 /* A file that claims more is damaged, or not meant for this. */
 #define MOST_SAMPLES ((size_t)1 << 33)
 
-static rl_code read_planes(const rl_oiio_module *module, rl_oiio_file *file, const char *path,
+static rl_code read_planes(const rl_oiio_module *module, rl_oiio_file *file, const char *path, uint64_t limit,
                            rl_image_file *out, rl_error *err)
 {
     char message[1024];
@@ -273,6 +273,15 @@ static rl_code read_planes(const rl_oiio_module *module, rl_oiio_file *file, con
     if (out->width < 1 || out->height < 1 || out->channels < 1 || pixels > MOST_SAMPLES / channels)
         return rl_fail_file(err, RL_E_FORMAT, path, "claims %d x %d pixels of %d channels", out->width,
                             out->height, out->channels);
+    const uint64_t bytes = 2 * (uint64_t)pixels * channels * sizeof(float);
+    if (limit && bytes > limit) {
+        char need[32], most[32];
+        return rl_fail_file(
+            err, RL_E_MEMORY, path,
+            "has %d x %d pixels of %d channels, which take %s to read, more than --memory-limit %s",
+            out->width, out->height, out->channels, rl_format_bytes(bytes, need),
+            rl_format_bytes(limit, most));
+    }
     float *mixed = rl_aligned(pixels * channels * sizeof *mixed);
     out->planes = rl_aligned(pixels * channels * sizeof *mixed);
     rl_code code = RL_OK;
@@ -288,6 +297,11 @@ static rl_code read_planes(const rl_oiio_module *module, rl_oiio_file *file, con
 }
 
 rl_code rl_image_file_read(const char *path, rl_image_file *out, rl_error *err)
+{
+    return rl_image_file_read_within(path, 0, out, err);
+}
+
+rl_code rl_image_file_read_within(const char *path, uint64_t limit, rl_image_file *out, rl_error *err)
 {
     const rl_oiio_module *module;
     rl_oiio_file *file;
@@ -305,7 +319,7 @@ rl_code rl_image_file_read(const char *path, rl_image_file *out, rl_error *err)
     memcpy(out->display, info.display, sizeof out->display);
     memcpy(out->names, info.names, sizeof out->names);
     memcpy(out->colorspace, info.colorspace, sizeof out->colorspace);
-    code = read_planes(module, file, path, out, err);
+    code = read_planes(module, file, path, limit, out, err);
     module->close(file);
     if (code != RL_OK)
         rl_image_file_free(out);

@@ -8,6 +8,7 @@
 
 #include <stdbool.h>
 #include <stddef.h>
+#include <stdint.h>
 
 #include "graph/base/error.h"
 #include "graph/base/pool.h"
@@ -81,6 +82,9 @@ typedef struct rl_image_file {
 /* A missing or unreadable file is RL_E_IO, one that is not an image RL_E_FORMAT. Free with
  * rl_image_file_free. */
 rl_code rl_image_file_read(const char *path, rl_image_file *out, rl_error *err);
+/* The same; RL_E_MEMORY, before anything is decoded, when that takes more than `limit` bytes (0: no limit).
+ */
+rl_code rl_image_file_read_within(const char *path, uint64_t limit, rl_image_file *out, rl_error *err);
 void rl_image_file_free(rl_image_file *file);
 
 /* A text attribute of a file ("Software"), "" when it has none, cut to `size` bytes. */

@@ -1,9 +1,12 @@
 /* The ambient light of a session: written coefficients, lobes and an HDRI, in the working space. */
+#include <math.h>
 #include <string.h>
 
 #include "graph/model/sky.h"
 #include "graph/run/image_file.h"
 #include "graph/run/session.h"
+
+#define RL_AMBIENT_BRIGHTEST 1e30f
 
 /* Row c of the matrix, times intensity. */
 static float convert(const rl_ambient *a, const float m[9], const double rgb[3], int c)
@@ -33,12 +36,22 @@ static rl_code add_sky(rl_session *s, const rl_ambient *a, const float *const rg
     return RL_OK;
 }
 
+static unsigned long long count_below(const rl_image_file *file)
+{
+    unsigned long long n = 0;
+    size_t samples = (size_t)file->width * (size_t)file->height * (file->channels >= 3 ? 3 : 1);
+    for (size_t i = 0; i < samples; i++)
+        n += file->planes[i] < 0;
+    return n;
+}
+
 static rl_code add_hdri(rl_session *s, rl_ambient *a, const float m[9], rl_error *err)
 {
     rl_image_file file = {0};
-    rl_code code = rl_image_file_read(a->hdri, &file, err);
+    rl_error why = {0};
+    rl_code code = rl_image_file_read_within(a->hdri, s->options.memory_limit, &file, &why);
     if (code)
-        return code;
+        return rl_fail(err, code, a->hdri_where, "the hdri '%s' %s", a->hdri, why.text);
     size_t plane = (size_t)file.width * (size_t)file.height;
     const float *rgb[3];
     for (size_t c = 0; c < 3; c++)
@@ -50,6 +63,10 @@ static rl_code add_hdri(rl_session *s, rl_ambient *a, const float m[9], rl_error
         rl_report(s->log, RL_WARNING, a->hdri_where,
                   "%s has %d x %d pixels; a latitude-longitude image is twice as wide as high", a->hdri,
                   file.width, file.height);
+    unsigned long long below = code ? 0 : count_below(&file);
+    if (below)
+        rl_report(s->log, RL_WARNING, a->hdri_where, "%s: %llu samples are below 0, and take light away",
+                  a->hdri, below);
     unsigned long long bad = code ? 0 : rl_ambient_project(a, rgb, file.width, file.height, a->sh);
     if (bad)
         rl_report(s->log, RL_WARNING, a->hdri_where, "%s: %llu samples are NaN or infinite and count as 0",
@@ -58,6 +75,24 @@ static rl_code add_hdri(rl_session *s, rl_ambient *a, const float m[9], rl_error
         code = add_sky(s, a, rgb, &file, m, err);
     rl_image_file_free(&file);
     return code;
+}
+
+/* Kernels compute with floats: what would not fit would be NaN in the picture. */
+static rl_code check_brightness(const rl_session *s, rl_where where, rl_error *err)
+{
+    const ambient_t *a = &s->ambient;
+    float most = 0;
+    for (int i = 0; i < 3 * RL_AMBIENT_BANDS; i++)
+        most = fabsf(a->sh[i]) <= RL_AMBIENT_BRIGHTEST ? most : a->sh[i];
+    for (int i = 0; i < 3 * a->lobes; i++)
+        most = a->lobe[i / 3].flux[i % 3] <= RL_AMBIENT_BRIGHTEST ? most : a->lobe[i / 3].flux[i % 3];
+    for (size_t i = 0; i < s->n_sky; i++)
+        most = fabsf(s->sky[i]) <= RL_AMBIENT_BRIGHTEST ? most : s->sky[i];
+    if (most != 0)
+        return rl_fail(err, RL_E_CONFIG, where,
+                       "the ambient light is too bright: %g W/(sr m2), at most %g can be computed with",
+                       (double)most, (double)RL_AMBIENT_BRIGHTEST);
+    return RL_OK;
 }
 
 rl_code rl_session_ambient(rl_session *s, rl_error *err)
@@ -87,7 +122,7 @@ rl_code rl_session_ambient(rl_session *s, rl_error *err)
                 convert(&a, m, lobe->amplitude, c) * (float)rl_ambient_lobe_flux(lobe->sharpness);
         }
     }
-    return RL_OK;
+    return check_brightness(s, a.colorspace_where, err);
 }
 
 _Static_assert((int)RL_AMBIENT_LOBES == RL_LOBES, "the pipeline's limit is the kernels'");

@@ -46,15 +46,15 @@ static const rl_layer *light_layer(const rl_manifest *m, const char *kind, const
 static rl_code no_such_shadow(const rl_manifest *m, const rl_light_spec *light, rl_error *err)
 {
     rl_str text = {0};
-    const char *names[64];
-    size_t n = 0;
+    const char *names[64] = {"screen", "none"};
+    size_t n = 2;
     for (int i = 0; i < m->n_layers && n < 64; i++)
         if (m->layers[i].id == RL_LAYER_SHADOW)
             names[n++] = m->layers[i].light;
     rl_suggest(&text, light->shadow_layer, names, n, "known");
-    rl_code code =
-        rl_fail(err, RL_E_CONFIG, light->where, "light '%s': the capture '%s' has no layer 'shadow.%s'%s",
-                light->name, m->name, light->shadow_layer, rl_str_text(&text));
+    rl_code code = rl_fail(err, RL_E_CONFIG, light->shadow_where,
+                           "light '%s': the capture '%s' has no layer 'shadow.%s'%s", light->name, m->name,
+                           light->shadow_layer, rl_str_text(&text));
     rl_str_free(&text);
     return code;
 }
@@ -77,7 +77,7 @@ static rl_code bind_shadow(const rl_session *s, const rl_manifest *m, rl_active_
  * of that space, which the working space tells from linear Rec.709. */
 static rl_code light_color(const rl_session *s, const rl_light_spec *spec, float m[9], rl_error *err)
 {
-    rl_code code = rl_session_light_matrix(s, spec->colorspace, spec->where, m, err);
+    rl_code code = rl_session_light_matrix(s, spec->colorspace, spec->colorspace_where, m, err);
     if (code || !(spec->kelvin > 0))
         return code;
     float rec709[9];

@@ -38,8 +38,16 @@ static void add_vector(rl_str *out, const char *key, const double v[3])
 /* ---- lights ----------------------------------------------------------------------------------------------
  */
 
+/* A length as a pipeline has it, in the capture's unit (metres); the unit's factor leaves noise behind the
+ * digits.
+ */
+static double in_unit(double metres, double unit)
+{
+    return round(metres / unit * 1e9) / 1e9;
+}
+
 /* What area lights and lights with ies have besides. */
-static void add_shape(rl_str *out, const rl_light_spec *l)
+static void add_shape(rl_str *out, const rl_light_spec *l, double unit)
 {
     const struct {
         const char *key;
@@ -48,7 +56,7 @@ static void add_shape(rl_str *out, const rl_light_spec *l)
     for (size_t i = 0; i < sizeof lengths / sizeof *lengths; i++)
         if (lengths[i].metres > 0) {
             rl_str_printf(out, ", %s: ", lengths[i].key);
-            add_number(out, lengths[i].metres);
+            add_number(out, in_unit(lengths[i].metres, unit));
         }
     if (l->type == RL_LIGHT_RECT || l->ies)
         add_vector(out, "up", l->up);
@@ -60,11 +68,25 @@ static void add_shape(rl_str *out, const rl_light_spec *l)
     }
 }
 
-static void add_light(rl_str *out, const rl_light_spec *l)
+static void add_shadow(rl_str *out, const rl_manifest *m, const rl_light_spec *l)
+{
+    if (l->shadow != RL_SHADOW_LAYER) {
+        rl_str_add(out, l->shadow == RL_SHADOW_SCREEN ? ", shadow: screen" : ", shadow: none");
+        return;
+    }
+    for (int i = 0; i < m->n_layers; i++)
+        if (m->layers[i].id == RL_LAYER_SHADOW && !strcmp(m->layers[i].light, l->shadow_layer)) {
+            rl_str_add(out, ", shadow: ");
+            add_text(out, l->shadow_layer);
+            return;
+        }
+}
+
+static void add_light(rl_str *out, const rl_manifest *m, const rl_light_spec *l)
 {
     double position[3];
-    for (int i = 0; i < 3; i++) /* micrometres: the unit's factor leaves noise behind them */
-        position[i] = round(l->position_m[i] * 1e6) / 1e6;
+    for (int i = 0; i < 3; i++)
+        position[i] = in_unit(l->position_m[i], m->unit);
     rl_str_add(out, "#  ");
     add_text(out, l->name);
     rl_str_printf(out, ": {type: %s", rl_light_type_names[l->type]);
@@ -72,7 +94,7 @@ static void add_light(rl_str *out, const rl_light_spec *l)
         add_vector(out, "position", position);
     if (l->direction[0] != 0 || l->direction[1] != 0 || l->direction[2] != 0)
         add_vector(out, "direction", l->direction);
-    add_shape(out, l);
+    add_shape(out, l, m->unit);
     if (l->type == RL_LIGHT_SPOT) {
         rl_str_add(out, ", angle: ");
         add_number(out, round(l->angle * 180 / 3.14159265358979323846 * 1e6) / 1e6);
@@ -105,25 +127,21 @@ static void add_light(rl_str *out, const rl_light_spec *l)
         rl_str_add(out, ", space: camera");
     if (!l->enabled)
         rl_str_add(out, ", enabled: false");
-    if (l->shadow == RL_SHADOW_LAYER) {
-        rl_str_add(out, ", shadow: ");
-        add_text(out, l->shadow_layer);
-    } else {
-        rl_str_add(out, l->shadow == RL_SHADOW_SCREEN ? ", shadow: screen" : ", shadow: none");
-    }
+    add_shadow(out, m, l);
     rl_str_add(out, "}\n");
 }
 
 static void add_lights(rl_str *out, const rl_manifest *m)
 {
     if (m->lights.n) {
-        rl_str_add(out,
-                   "\n# The capture's own lights are used, as they were recorded. Uncomment to re-light:\n"
-                   "# intensity in W/sr, positions in metres, shadow: a layer, screen (found in the depth "
-                   "buffer, slower) or none.\n"
-                   "#lights:\n");
+        rl_str_add(
+            out,
+            "\n# The capture's own lights are used, as they were recorded. Uncomment to re-light:\n"
+            "# intensity in W/sr, lengths in the capture's unit, shadow: a layer, screen (found in the depth "
+            "buffer, slower) or none.\n"
+            "#lights:\n");
         for (size_t i = 0; i < m->lights.n; i++)
-            add_light(out, &m->lights.light[i]);
+            add_light(out, m, &m->lights.light[i]);
         return;
     }
     rl_str_add(out,
@@ -131,7 +149,10 @@ static void add_lights(rl_str *out, const rl_manifest *m)
                "shadow: screen\n"
                "# its shadows are found in the depth buffer, which takes longer (relit passes lighting).\n"
                "lights:\n"
-               "  key: {type: point, space: camera, position: [-0.5, 0.5, 0], intensity: 2, shadow: none}\n");
+               "  key: {type: point, space: camera");
+    const double beside[3] = {in_unit(-0.5, m->unit), in_unit(0.5, m->unit), 0};
+    add_vector(out, "position", beside);
+    rl_str_add(out, ", intensity: 2, shadow: none}\n");
 }
 
 /* ---- materials -------------------------------------------------------------------------------------------
@@ -242,14 +263,22 @@ static rl_code choose_view(rl_arena *arena, const char **display, const char **v
     return code;
 }
 
-static void add_graph(rl_str *out, const char *display, const char *view)
+static void add_graph(rl_str *out, const rl_manifest *m, const char *display, const char *view)
 {
+    bool backs = rl_manifest_layer(m, "back_depth") && rl_manifest_layer(m, "back_normal");
+    rl_str_add(out, "\ngraph:\n"
+                    "  light: {pass: lighting}\n"
+                    "  sss:   {pass: sss_burley, in: {diffuse: light.diffuse, lit: light.lit}, taps: auto}\n"
+                    "  aa:    {pass: taa, in: {color: sss.color}}\n");
+    if (backs)
+        rl_str_add(out,
+                   "# The capture has back faces. To gather the light that comes through from behind, give "
+                   "profiles\n"
+                   "# `transmission: gather`, uncomment these two, and let sss take `lit: through.lit`:\n"
+                   "#  behind:  {pass: back_lighting}\n"
+                   "#  through: {pass: translucency, in: {back: behind.diffuse, lit: light.lit}}\n");
     rl_str_add(
         out,
-        "\ngraph:\n"
-        "  light: {pass: lighting}\n"
-        "  sss:   {pass: sss_burley, in: {diffuse: light.diffuse, lit: light.lit}, taps: auto}\n"
-        "  aa:    {pass: taa, in: {color: sss.color}}\n"
         "\noutputs:\n"
         "  beauty:  {image: aa.color, file: \"{capture}.{frame:04}.exr\", type: half, compression: zip}\n"
         "  preview: {image: aa.color, file: \"{capture}.{frame:04}.png\"");
@@ -293,6 +322,6 @@ int rl_cmd_init(rl_tool *tool, rl_error *err)
     add_profiles(&text, capture.manifest);
     add_materials(&text, capture.manifest, ids, n_ids);
     add_lights(&text, capture.manifest);
-    add_graph(&text, display, view);
+    add_graph(&text, capture.manifest, display, view);
     return rl_tool_print(tool, &text, err);
 }

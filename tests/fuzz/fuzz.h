@@ -7,6 +7,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "graph/base/error.h"
+
 typedef struct fuzz_bytes {
     uint8_t *data; /* malloc'ed */
     size_t size;
@@ -28,6 +30,18 @@ extern const fuzz_target fuzz_targets[];
 extern const size_t fuzz_n_targets;
 
 enum { FUZZ_MOST_SEEDS = 32, FUZZ_MOST_BYTES = 1 << 16 };
+
+/* ---- for targets ---- */
+
+/* Ends the process: a promise that relit makes does not hold. */
+void fuzz_broken(const char *promise, const rl_error *err);
+/* What must hold after any call: an error says what is wrong, and it is the user's, not relit's. */
+void fuzz_check(rl_code code, const rl_error *err);
+void fuzz_write_input(const char *folder, const char *name, const uint8_t *data, size_t size);
+fuzz_bytes fuzz_seed_text(const char *text);
+
+size_t fuzz_begin_ies(const char *folder, fuzz_bytes *seeds, size_t room);
+bool fuzz_one_ies(const char *folder, const uint8_t *data, size_t size);
 
 /* The n-th input of a run: a seed, changed one to a dozen times. Returns its size; `out` holds
  * FUZZ_MOST_BYTES. */

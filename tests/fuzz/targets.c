@@ -20,27 +20,26 @@
 /* Bytes that an input may make relit allocate. */
 #define LIMIT (64u << 20)
 
-static void broken(const char *promise, const rl_error *err)
+void fuzz_broken(const char *promise, const rl_error *err)
 {
     fprintf(stderr, "broken promise: %s (%s: '%s')\n", promise, rl_code_name(err->code), err->text);
     abort();
 }
 
-/* What must hold after any call: an error says what is wrong, and it is the user's, not relit's. */
-static void check(rl_code code, const rl_error *err)
+void fuzz_check(rl_code code, const rl_error *err)
 {
     if (code != err->code)
-        broken("the code is not the error's", err);
+        fuzz_broken("the code is not the error's", err);
     if (code && !err->text[0])
-        broken("an error has a text", err);
+        fuzz_broken("an error has a text", err);
     if (code == RL_E_INTERNAL)
-        broken("no input leads to a broken promise inside", err);
+        fuzz_broken("no input leads to a broken promise inside", err);
     for (const char *c = err->text; *c; c++)
         if ((unsigned char)*c < ' ')
-            broken("a message is one line of text", err);
+            fuzz_broken("a message is one line of text", err);
 }
 
-static void write_input(const char *folder, const char *name, const uint8_t *data, size_t size)
+void fuzz_write_input(const char *folder, const char *name, const uint8_t *data, size_t size)
 {
     char *path = path_in(folder, name);
     FILE *f = fopen(path, "wb");
@@ -49,7 +48,7 @@ static void write_input(const char *folder, const char *name, const uint8_t *dat
     free(path);
 }
 
-static fuzz_bytes seed_text(const char *text)
+fuzz_bytes fuzz_seed_text(const char *text)
 {
     fuzz_bytes b = {malloc(strlen(text) + 1), strlen(text)};
     if (!b.data)
@@ -76,16 +75,16 @@ static bool open_session(const char *folder)
     size_t before = rl_alloc_live();
     rl_options options = {.pipeline = pipe, .out = "/nonexistent", .threads = 1, .memory_limit = LIMIT};
     rl_code code = rl_session_open(&options, &session, &err);
-    check(code, &err);
+    fuzz_check(code, &err);
     for (int format = RL_PLAN_TEXT; !code && format <= RL_PLAN_JSON; format++) {
         char *text = NULL;
-        check(rl_session_plan(session, 0, (rl_plan_format)format, &text, &err), &err);
+        fuzz_check(rl_session_plan(session, 0, (rl_plan_format)format, &text, &err), &err);
         rl_text_free(text);
     }
     rl_session_close(&session);
     free(pipe);
     if (rl_alloc_live() != before)
-        broken("nothing is left behind", &err);
+        fuzz_broken("nothing is left behind", &err);
     return !code;
 }
 
@@ -128,7 +127,7 @@ static size_t begin_pipeline(const char *folder, fuzz_bytes *seeds, size_t room)
 {
     size_t n = begin_files(folder);
     (void)room;
-    seeds[n++] = seed_text(small_pipeline);
+    seeds[n++] = fuzz_seed_text(small_pipeline);
     static const char *const files[] = {"configs/skin.yaml", "configs/common/profiles.yaml"};
     for (size_t i = 0; i < sizeof files / sizeof *files; i++)
         seeds[n++] = seed_file(files[i]);
@@ -137,7 +136,7 @@ static size_t begin_pipeline(const char *folder, fuzz_bytes *seeds, size_t room)
 
 static bool one_pipeline(const char *folder, const uint8_t *data, size_t size)
 {
-    write_input(folder, "pipe.yaml", data, size);
+    fuzz_write_input(folder, "pipe.yaml", data, size);
     return open_session(folder);
 }
 
@@ -145,7 +144,7 @@ static size_t begin_kernel(const char *folder, fuzz_bytes *seeds, size_t room)
 {
     size_t n = begin_files(folder);
     (void)room;
-    seeds[n++] = seed_text(kernel_pipeline);
+    seeds[n++] = fuzz_seed_text(kernel_pipeline);
     return n;
 }
 
@@ -153,7 +152,7 @@ static size_t begin_manifest(const char *folder, fuzz_bytes *seeds, size_t room)
 {
     size_t n = begin_files(folder);
     (void)room;
-    seeds[n++] = seed_text(small_manifest);
+    seeds[n++] = fuzz_seed_text(small_manifest);
     seeds[n++] = seed_file("captures/monkey/capture.yaml");
     seeds[n++] = seed_file("captures/monkey_turn/capture.yaml");
     return n;
@@ -161,7 +160,7 @@ static size_t begin_manifest(const char *folder, fuzz_bytes *seeds, size_t room)
 
 static bool one_manifest(const char *folder, const uint8_t *data, size_t size)
 {
-    write_input(folder, "capture.yaml", data, size);
+    fuzz_write_input(folder, "capture.yaml", data, size);
     return open_session(folder);
 }
 
@@ -213,7 +212,7 @@ static size_t begin_exr(const char *folder, fuzz_bytes *seeds, size_t room)
                                     .compression = c};
         rl_error err = {0};
         if (rl_exr_write(path, &image, NULL, NULL, &err))
-            broken("a seed can be written", &err);
+            fuzz_broken("a seed can be written", &err);
         seeds[n++] = seed_file(path);
     }
     const made_part parts[] = {{.name = "one",
@@ -258,7 +257,7 @@ static bool read_part(const rl_exr *file, int p)
             plane.ids = (uint32_t *)(void *)out;
         else
             plane.floats = out;
-        check(rl_exr_read(file, p, &plane, 1, NULL, NULL, &err), &err);
+        fuzz_check(rl_exr_read(file, p, &plane, 1, NULL, NULL, &err), &err);
         fine |= !err.code;
     }
     rl_free(out);
@@ -271,15 +270,15 @@ static bool one_exr(const char *folder, const uint8_t *data, size_t size)
     rl_exr *file = NULL;
     char *path = path_in(folder, "in.exr");
     size_t before = rl_alloc_live();
-    write_input(folder, "in.exr", data, size);
-    check(rl_exr_open(path, LIMIT, &file, &err), &err);
+    fuzz_write_input(folder, "in.exr", data, size);
+    fuzz_check(rl_exr_open(path, LIMIT, &file, &err), &err);
     bool fine = file != NULL;
     for (int p = 0; file && p < rl_exr_parts(file) && p < 4; p++)
         fine &= read_part(file, p);
     rl_exr_close(&file);
     free(path);
     if (rl_alloc_live() != before)
-        broken("nothing is left behind", &err);
+        fuzz_broken("nothing is left behind", &err);
     return fine;
 }
 
@@ -323,7 +322,7 @@ static size_t begin_frame(const char *folder, fuzz_bytes *seeds, size_t room)
     rl_error err = {0};
     rl_options options = {.pipeline_text = frame_pipeline, .threads = 2, .memory_limit = LIMIT};
     if (rl_session_open(&options, &frames, &err) || rl_session_prepare(frames, &err))
-        broken("the frame target's pipeline is fine", &err);
+        fuzz_broken("the frame target's pipeline is fine", &err);
     for (size_t n = 0; n < 4; n++) { /* sizes, place, camera, then samples */
         static const float start[] = {50, 40, 0, 0, 0.6f, 0.1f, 0.2f, 0.5f, 0.5f, -0.5f, 0.7f, 0.01f};
         float v[64];
@@ -374,11 +373,11 @@ static bool one_frame(const char *folder, const uint8_t *data, size_t size)
         .jitter = {(double)v[5], (double)v[6]}};
     rl_image_view image;
     rl_code code = rl_session_process(frames, 0, ++number, &frame, &err);
-    check(code, &err);
+    fuzz_check(code, &err);
     if (!code)
-        check(rl_session_image(frames, "aa.color", &image, &err), &err);
+        fuzz_check(rl_session_image(frames, "aa.color", &image, &err), &err);
     if (!code && (image.width != frame.width || image.height != frame.height))
-        broken("the image has the frame's size", &err);
+        fuzz_broken("the image has the frame's size", &err);
     return !code;
 }
 
@@ -391,6 +390,7 @@ const fuzz_target fuzz_targets[] = {
     {"pipeline", "a pipeline's YAML, up to the plan", true, begin_pipeline, one_pipeline, NULL},
     {"kernel", "a user kernel's declaration, up to the plan", true, begin_kernel, one_pipeline, NULL},
     {"manifest", "a capture's YAML, up to the plan", true, begin_manifest, one_manifest, NULL},
+    {"ies", "photometric files of lamps", true, fuzz_begin_ies, fuzz_one_ies, NULL},
     {"exr", "EXR files: headers, attributes, pixels", false, begin_exr, one_exr, NULL},
     {"frame", "frames in memory: sizes, cameras, samples of any value, through the kernels", false,
      begin_frame, one_frame, end_frame},
