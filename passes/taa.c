@@ -2,8 +2,7 @@
  * colours around the pixel, blend. Static, jittered frames with blend 0 add up to their plain mean.
  *
  * Variance clipping: Salvi 2016. Closest motion, luminance weights: Karis 2014. Motion without a layer, by
- * tiles: Lucas and Kanade 1981. Survey of the rest: Yang et
- * al. 2020. */
+ * tiles: Lucas and Kanade 1981; Longuet-Higgins and Prazdny 1980. Survey of the rest: Yang et al. 2020. */
 #include "graph/model/pass.h"
 #include "passes/shading_rows.h"
 
@@ -65,7 +64,7 @@ const rl_pass rl_pass_taa = {
     .help = "temporal anti-aliasing with variance clipping",
     .source = "Salvi 2016; Karis 2014; Lucas and Kanade 1981; Yang et al. 2020",
     .kernel = "taa.cl",
-    .kernel_prelude = "energy.cl temporal.cl taa_motion.cl",
+    .kernel_prelude = "energy.cl temporal.cl taa_tile.cl taa_search.cl taa_motion.cl",
     .params = RL_ARRAY(params),
     .params_size = sizeof(taa_params),
     .ports = RL_ARRAY(ports),

@@ -78,7 +78,7 @@ static void moving_frames_approach_the_truth(void **state)
                  {"object moves", false, true, true, 0.03},
                  {"object moves, no motion layer", false, true, false, 0.03},
                  {"both move", true, true, true, 0.03},
-                 {"both move, no motion layer", true, true, false, 0.032}};
+                 {"both move, no motion layer", true, true, false, 0.03}};
     (void)state;
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         temporal_report r;
@@ -107,9 +107,8 @@ static void fine_detail_survives_motion(void **state)
     temporal_report_free(&r);
 }
 
-/* In front of a plain wall every trail would show. The motion that is found is off by a part of a pixel at
- * the outline, where a tile holds little of the object: the pixel next to it is as good as a sample, and all
- * is better in the mean. */
+/* In front of a plain wall every trail would show: with exact motion, and where it has to be found, right at
+ * the outline too, of which many tiles hold little. */
 static void no_trail_behind_an_edge(void **state)
 {
     temporal_report r;
@@ -120,10 +119,12 @@ static void no_trail_behind_an_edge(void **state)
     assert_true(r.behind <= r.ahead);
     temporal_report_free(&r);
     run_on(&scene, false, 16, 4, &r);
-    print_message("no motion layer: 3 to 8 pixels behind %.5f, a sample %.5f\n", r.far_behind,
-                  r.far_behind_raw);
+    print_message(
+        "no motion layer: 1 to 8 pixels behind %.5f, in front %.5f; 3 to 8 behind %.5f, a sample %.5f\n",
+        r.behind, r.ahead, r.far_behind, r.far_behind_raw);
+    assert_true(r.behind <= r.ahead);
     assert_true(r.far_behind <= r.far_behind_raw);
-    assert_true(r.psnr > r.raw_psnr + 1);
+    assert_true(r.psnr > r.raw_psnr + 3);
     temporal_report_free(&r);
 }
 
