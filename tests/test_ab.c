@@ -237,6 +237,65 @@ static void test_pipelines(void **state)
     free(second);
 }
 
+/* A path into a light of the capture, which no file of the pipeline lists, changes that light. */
+static void test_capture_lights(void **state)
+{
+    (void)state;
+    tool_result r = AB("--vary", "lights.key.exposure=0,1", "--seeds", "1");
+    expect(&r, 0);
+    same_as_run("exposure_0", "graph.sss.taps=21", "lights.key.exposure=0");
+    same_as_run("exposure_1", "graph.sss.taps=21", "lights.key.exposure=1");
+    json_t *root = metrics();
+    assert_true(mean_of(root, 0, 1, "flip") > 0.05);
+    json_decref(root);
+    tool_result_free(&r);
+}
+
+/* One capture under two names is one capture. */
+static void test_spellings(void **state)
+{
+    (void)state;
+    char *again = path_in(folder, "./pipe.yaml");
+    tool_result r = RUN("ab", pipe_file, again, "--out", out, "--quiet", "--seeds", "1");
+    expect(&r, 0);
+    expect_in(r.out, "pipe_2 is bit-identical to pipe in all 3 frames");
+    tool_result_free(&r);
+    free(again);
+}
+
+/* A kernel that its file does not have is found before the first frame. */
+static void test_no_such_kernel(void **state)
+{
+    (void)state;
+    static const char text[] = "relit: 1\ninclude: [pipe.yaml]\ngraph:\n"
+                               "  own: {pass: kernel, file: own.cl, entry: brighter, in: {color: aa.color},\n"
+                               "    ports: {color: {role: read, type: rgb}, out: {role: write, type: rgb}}}\n"
+                               "outputs: {beauty: {image: own.out}}\n",
+                      source[] = "kernel void bright(void) {}\n";
+    char *own = path_in(folder, "own.yaml");
+    file_write(folder, "own.yaml", text, strlen(text));
+    file_write(folder, "own.cl", source, strlen(source));
+    static const char *const commands[] = {"check", "run", "ab"};
+    for (size_t i = 0; i < 3; i++) {
+        tool_result r =
+            RUN(commands[i], own, "--out", out, "--quiet", i < 2 ? NULL : "--vary", "graph.sss.taps=4,21");
+        expect(&r, 2);
+        expect_in(r.err, "own.yaml:4:3: error: pass 'own' (kernel) has no kernel 'brighter'; did you mean "
+                         "'bright'? known: bright");
+        tool_result_free(&r);
+    }
+    free(own);
+}
+
+static void remove_files(const char *where, const char *first, const char *second)
+{
+    char *a = path_in(where, first), *b = path_in(where, second);
+    assert_int_equal(unlink(a), 0);
+    assert_int_equal(unlink(b), 0);
+    free(a);
+    free(b);
+}
+
 static void test_against(void **state)
 {
     (void)state;
@@ -260,6 +319,17 @@ static void test_against(void **state)
     tool_result_free(&r);
     r = AB("--against", reference); /* one variant is enough */
     expect(&r, 0);
+    tool_result_free(&r);
+    /* What an earlier comparison left: each variant finds its own. */
+    r = RUN("ab", pipe_file, "--vary", "graph.sss.taps=21,4", "--seeds", "1", "--out", reference, "--quiet");
+    expect(&r, 0);
+    tool_result_free(&r);
+    remove_files(reference, "s.0002.exr", "s.0002.png"); /* of the run */
+    r = AB("--vary", "graph.sss.taps=21,4", "--against", reference, "--seeds", "1");
+    expect(&r, 0);
+    root = metrics();
+    assert_true(mean_of(root, 0, 2, "hdrflip") < 0.003 && mean_of(root, 1, 2, "hdrflip") < 0.003);
+    json_decref(root);
     tool_result_free(&r);
     free(reference);
 }
@@ -340,6 +410,7 @@ static void test_wrong(void **state)
         {{"--vary", "graph.sss.taps=8,16", "--sheet=a.nothing"}, "'.nothing'"},
         {{"--vary", "graph.sss.taps=8,16", "--against", "/nowhere/at/all"}, "/nowhere/at/all"},
         {{"--vary", "graph.sss.taps=8,16", "--report-frames", "frist"}, "frist"},
+        {{"--vary", "lights.kee.exposure=0,1"}, "there is no light 'kee'; did you mean 'key'? known: key"},
         {{"--vary", "graph.sss.taps=8,16", "--set", "outputs.preview.file=../{capture}.{frame}.png"},
          "output 'preview': variants 'taps_8' and 'taps_16' would both write '"},
         {{"--vary", "graph.sss.taps=8,16", "--set", "outputs.preview.file=/nowhere/{frame}.png"},
@@ -542,9 +613,10 @@ int main(void)
         *strrchr(program, '/') = 0;
     strcat(program, "/relit");
     const struct CMUnitTest tests[] = {
-        TEST(test_grid),         TEST(test_pipelines),      TEST(test_against), TEST(test_over),
-        TEST(test_failed_frame), TEST(test_wrong),          TEST(test_signal),  TEST(test_sheet),
-        TEST(test_json),         TEST(test_default_folder), TEST(test_plan),    TEST(test_plan_drawn),
+        TEST(test_grid),           TEST(test_pipelines), TEST(test_capture_lights), TEST(test_spellings),
+        TEST(test_no_such_kernel), TEST(test_against),   TEST(test_over),           TEST(test_failed_frame),
+        TEST(test_wrong),          TEST(test_signal),    TEST(test_sheet),          TEST(test_json),
+        TEST(test_default_folder), TEST(test_plan),      TEST(test_plan_drawn),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

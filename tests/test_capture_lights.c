@@ -81,6 +81,36 @@ static void expect_lights(const char *lights, scene s)
     free(pipeline);
 }
 
+/* ---- the capture's ---- */
+
+/* Paths of --set into lights that the pipeline does not list change the capture's; what is written replaces
+ * them. */
+static void test_paths(void **state)
+{
+    (void)state;
+    static const struct {
+        rl_setting settings[2];
+        size_t n;
+        unsigned lights;
+    } rows[] = {
+        {{{"lights.rim.enabled", "false"}, {"lights.key.efficacy", "100"}}, 2, SCENE_LIGHTS & ~SCENE_RIM},
+        {{{"lights.rim.enabled", "true"}}, 1, SCENE_LIGHTS},
+        {{{"lights", "{}"}}, 1, 0}};
+    static const char *const color[] = {"c.color"};
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        const rl_options options = {
+            .dump = color, .n_dump = 1, .settings = rows[i].settings, .n_settings = rows[i].n};
+        rl_error err = {0};
+        rl_session *r = capture_open(folder, capture_pipeline, &options);
+        scene s = truth(rows[i].lights, SCENE_KEY | SCENE_RIM);
+        assert_int_equal(rl_session_process(r, 0, 1, NULL, &err), RL_OK);
+        rl_image_view view = capture_image(r, "c.color");
+        assert_true(capture_error(&view, &s, SCENE_COLOR, 3, i < 2 ? 0 : 1) <= 4e-6);
+        rl_session_close(&r);
+        scene_free(&s);
+    }
+}
+
 /* ---- units ---- */
 
 static void test_photometric(void **state)
@@ -379,17 +409,12 @@ static void test_memory_without_name(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_photometric),
-        cmocka_unit_test(test_sphere),
-        cmocka_unit_test(test_shadows),
-        cmocka_unit_test(test_no_such_shadow),
-        cmocka_unit_test(test_renamed_layers),
-        cmocka_unit_test(test_camera_space),
-        cmocka_unit_test(test_working_space),
-        cmocka_unit_test(test_bare),
-        cmocka_unit_test(test_preset_inline),
-        cmocka_unit_test(test_preset_blender),
-        cmocka_unit_test(test_memory_without_name),
+        cmocka_unit_test(test_paths),          cmocka_unit_test(test_photometric),
+        cmocka_unit_test(test_sphere),         cmocka_unit_test(test_shadows),
+        cmocka_unit_test(test_no_such_shadow), cmocka_unit_test(test_renamed_layers),
+        cmocka_unit_test(test_camera_space),   cmocka_unit_test(test_working_space),
+        cmocka_unit_test(test_bare),           cmocka_unit_test(test_preset_inline),
+        cmocka_unit_test(test_preset_blender), cmocka_unit_test(test_memory_without_name),
     };
     return cmocka_run_group_tests(tests, setup, teardown);
 }

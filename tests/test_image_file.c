@@ -1,11 +1,13 @@
 /* Image files through the OpenImageIO module: round trips by the module's own reader, and errors. */
 #include <math.h>
 #include <setjmp.h>
+#include <signal.h>
 #include <stdarg.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -260,6 +262,41 @@ static void test_unwritable(void **state)
     assert_int_equal(files_in_folder(), before);
 }
 
+/* A file that cannot grow is an error for every format, wherever it stops, and leaves nothing; JPEG's library
+ * would end the process. Not TIFF, which is made in memory, where the limit holds, too, but the disk does
+ * not. */
+static void test_full(void **state)
+{
+    static const char *const names[] = {"f.png", "f.jpg", "f.bmp", "f.tga", "f.dpx", "f.webp"};
+    rl_image_planes p = planes(3);
+    struct rlimit limit;
+    (void)state;
+    signal(SIGXFSZ, SIG_IGN);
+    assert_int_equal(getrlimit(RLIMIT_FSIZE, &limit), 0);
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
+        rl_image_options o = {.type = RL_IMAGE_U8};
+        struct stat st;
+        assert_int_equal(rl_image_file_write(in_folder(names[i]), &p, &o, NULL, NULL, NULL), RL_OK);
+        assert_int_equal(stat(in_folder(names[i]), &st), 0);
+        assert_int_equal(unlink(in_folder(names[i])), 0);
+        int before = files_in_folder();
+        for (rlim_t part = 0; part < 4; part++) {
+            struct rlimit small = limit;
+            rl_error err = {0};
+            small.rlim_cur = part < 3 ? (rlim_t)st.st_size * part / 3 : (rlim_t)st.st_size - 1;
+            assert_int_equal(setrlimit(RLIMIT_FSIZE, &small), 0);
+            rl_code code = rl_image_file_write(in_folder(names[i]), &p, &o, NULL, NULL, &err);
+            assert_int_equal(setrlimit(RLIMIT_FSIZE, &limit), 0);
+            if (code != RL_E_IO)
+                print_error("%s up to byte %d of %d: %d\n", names[i], (int)small.rlim_cur, (int)st.st_size,
+                            code);
+            assert_int_equal(code, RL_E_IO);
+            assert_non_null(strstr(err.text, "cannot be written"));
+            assert_int_equal(files_in_folder(), before);
+        }
+    }
+}
+
 static void test_unreadable(void **state)
 {
     rl_image_planes p = planes(3);
@@ -309,6 +346,7 @@ int main(void)
         cmocka_unit_test(test_windows),
         cmocka_unit_test(test_unknown_extension),
         cmocka_unit_test(test_unwritable),
+        cmocka_unit_test(test_full),
         cmocka_unit_test(test_unreadable),
         cmocka_unit_test(test_out_of_memory),
     };

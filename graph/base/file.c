@@ -4,6 +4,7 @@
 #include <fcntl.h>
 #include <stdatomic.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -189,6 +190,17 @@ char *rl_path_join(rl_arena *arena, const char *folder, const char *path)
         return rl_arena_strdup(arena, path);
     size_t n = strlen(folder);
     return rl_arena_printf(arena, "%s%s%s", folder, folder[n - 1] == '/' ? "" : "/", path);
+}
+
+char *rl_path_real(rl_arena *arena, const char *path)
+{
+    char *folder = rl_path_folder(arena, path);
+    char *real = folder ? realpath(*folder ? folder : ".", NULL) : NULL;
+    char *out = !folder ? NULL
+                : real  ? rl_path_join(arena, real, rl_path_name(path))
+                        : rl_arena_strdup(arena, path);
+    free(real);
+    return out;
 }
 
 const char *rl_path_name(const char *path)

@@ -36,6 +36,9 @@ bool rl_path_is_folder(const char *path);
  * "b"; "x/y.0001.exr" -> "y.0001.exr"; the part from the last dot of the file's name (".exr") or "". */
 char *rl_path_folder(rl_arena *arena, const char *path);
 char *rl_path_join(rl_arena *arena, const char *folder, const char *path);
+/* With a folder that has no links and no dots in it, so that one file has one spelling; a copy as it is when
+ * there is no such folder. NULL when memory is out. */
+char *rl_path_real(rl_arena *arena, const char *path);
 const char *rl_path_name(const char *path);
 const char *rl_path_extension(const char *path);
 

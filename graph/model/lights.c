@@ -306,7 +306,24 @@ static rl_code check_keys(const rl_value *v, const rl_light_spec *l, rl_error *e
     return RL_OK;
 }
 
-static rl_code read_type(const rl_entry *e, rl_light_spec *l, rl_error *err)
+/* A path into a light that is not there would make one that lacks all the rest. */
+static rl_code no_such_light(const rl_value *all, const rl_entry *e, rl_error *err)
+{
+    const char *known[64];
+    size_t n = 0;
+    rl_str text = {0};
+    for (size_t i = 0; i < all->n && n < sizeof known / sizeof *known; i++)
+        if (&all->entries[i] != e)
+            known[n++] = all->entries[i].key;
+    rl_suggest(&text, e->key, known, n, "known");
+    rl_code code = rl_fail(err, RL_E_CONFIG, e->value->where,
+                           "there is no light '%s'%s (a new one needs 'type' and 'position' or 'direction')",
+                           e->key, rl_str_text(&text));
+    rl_str_free(&text);
+    return code;
+}
+
+static rl_code read_type(const rl_value *all, const rl_entry *e, rl_light_spec *l, rl_error *err)
 {
     static const char *const known[] = {
         "type",     "position", "direction", "up",    "angle",     "blend",       "radius",
@@ -322,6 +339,8 @@ static rl_code read_type(const rl_entry *e, rl_light_spec *l, rl_error *err)
     rl_str_free(&what);
     if (code)
         return code;
+    if (!type && v->implied)
+        return no_such_light(all, e, err);
     if (!type)
         return rl_fail(err, RL_E_CONFIG, v->where,
                        "light '%s' needs 'type': point, spot, directional, sphere or rect", e->key);
@@ -332,10 +351,11 @@ static rl_code read_type(const rl_entry *e, rl_light_spec *l, rl_error *err)
     return code;
 }
 
-static rl_code read_light(rl_arena *arena, const rl_entry *e, double metres, rl_light_spec *l, rl_error *err)
+static rl_code read_light(rl_arena *arena, const rl_value *all, const rl_entry *e, double metres,
+                          rl_light_spec *l, rl_error *err)
 {
     const rl_value *v = e->value;
-    rl_code code = read_type(e, l, err);
+    rl_code code = read_type(all, e, l, err);
     if (!code)
         code = check_keys(v, l, err);
     if (!code)
@@ -367,7 +387,7 @@ rl_code rl_lights_parse(rl_arena *arena, const rl_value *v, double metres, rl_li
         return rl_fail_memory(err, v->n * sizeof *out->light);
     rl_code code = RL_OK;
     for (size_t i = 0; i < v->n && !code; i++)
-        code = read_light(arena, &v->entries[i], metres, &out->light[i], err);
+        code = read_light(arena, v, &v->entries[i], metres, &out->light[i], err);
     out->n = code ? 0 : v->n;
     return code;
 }

@@ -140,8 +140,10 @@ static rl_code read_all(rl_manifest_reader *r, const rl_value *v)
         code = rl_manifest_read_files(r, rl_value_get(v, "files"));
     if (!code)
         code = read_texts(r, v);
-    if (!code && (x = rl_value_get(v, "lights")))
+    if (!code && (x = rl_value_get(v, "lights"))) {
+        m->lights_written = (rl_value *)x;
         code = rl_lights_parse(r->arena, x, m->unit, &m->lights, r->err);
+    }
     if (!code && (x = rl_value_get(v, "stencil_names")))
         code = read_stencil_names(r, x);
     if (!code && (x = rl_value_get(v, "cuts")))

@@ -139,6 +139,7 @@ typedef struct rl_manifest {
     rl_layer *layers;
     int n_layers;
     rl_lights lights;
+    rl_value *lights_written; /* the map that they were read from; NULL when there is none */
     rl_stencil_label *stencil_names;
     size_t n_stencil_names;
     rl_frames cuts; /* frames that start a new shot */

@@ -66,9 +66,9 @@ typedef struct rl_pipeline {
     const char *working;     /* working colour space, or NULL: the config's scene_linear role */
     rl_where color_where;
     const rl_value *profiles, *shading, *materials; /* maps or NULL, see materials.h */
-    const rl_value *lights;                         /* map, or NULL: the capture's own */
-    const rl_value *ambient;                        /* map (ambient.h), or NULL */
-    const rl_node *nodes;                           /* in the order of the file */
+    const rl_value *lights;  /* map, or NULL: the capture's own; `implied`: changes to those */
+    const rl_value *ambient; /* map (ambient.h), or NULL */
+    const rl_node *nodes;    /* in the order of the file */
     size_t n_nodes;
     const rl_output *outputs;
     size_t n_outputs;

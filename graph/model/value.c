@@ -229,7 +229,7 @@ rl_value *rl_value_merge(rl_arena *arena, rl_value *base, rl_value *over)
 {
     if (!over || over->kind != RL_MAP)
         return over ? over : base;
-    rl_value none = {.kind = RL_MAP};
+    rl_value none = {.kind = RL_MAP, .implied = over->implied};
     rl_value *merged = copy_with_room(arena, base && base->kind == RL_MAP ? base : &none, over->n);
     if (!merged)
         return NULL;
@@ -306,7 +306,7 @@ static rl_code set_in_map(const setting *s, rl_value *map, const char *rest, siz
 static rl_code set_at(const setting *s, rl_value **at, const char *rest)
 {
     size_t length = strcspn(rest, ".");
-    rl_value none = {.kind = RL_MAP, .where = s->v->where};
+    rl_value none = {.kind = RL_MAP, .implied = true, .where = s->v->where};
     const rl_value *old = *at && (*at)->kind != RL_NULL ? *at : &none;
     char buf[96];
     if (old->kind != RL_MAP && old->kind != RL_LIST)

@@ -29,6 +29,7 @@ struct rl_value {
     rl_where where; /* of the value; .file lives in the arena. "--set graph.sss.taps" for values from there */
     const char *text; /* scalars: exactly what was written, quotes removed; else NULL */
     bool truth;       /* RL_TRUTH */
+    bool implied;     /* RL_MAP: nobody wrote it; rl_value_set made it on the way to a value below */
     bool integral;    /* RL_NUMBER: written as an integer (decimal, 0x or 0o) that fits `integer` */
     long long integer;
     double number;     /* RL_NUMBER; .nan and .inf are numbers */

@@ -589,6 +589,33 @@ static rl_code get_kernel(rl_program *p, const char *entry, cl_kernel *out, rl_e
     return RL_OK;
 }
 
+rl_code rl_program_check(const rl_program *p, const char *entry, const char *what, rl_where where,
+                         rl_error *err)
+{
+    char list[4096] = "";
+    const char *names[MOST_KERNELS];
+    size_t n = 0;
+    cl_int status = CL(clGetProgramInfo(p->program, CL_PROGRAM_KERNEL_NAMES, sizeof list - 1, list, NULL));
+    if (status)
+        return rl_fail(err, RL_E_DEVICE, RL_NOWHERE, "OpenCL program '%s': its kernels: %s (%d)", p->name,
+                       status_text(status), status);
+    for (char *at = list, *next; at && n < MOST_KERNELS; at = next) {
+        next = strchr(at, ';');
+        if (next)
+            *next++ = 0;
+        if (!strcmp(at, entry))
+            return RL_OK;
+        if (*at)
+            names[n++] = at;
+    }
+    rl_str text = {0};
+    rl_suggest(&text, entry, names, n, "known");
+    rl_code code =
+        rl_fail(err, RL_E_BUILD, where, "%s has no kernel '%s'%s", what, entry, rl_str_text(&text));
+    rl_str_free(&text);
+    return code;
+}
+
 /* ---- running ---------------------------------------------------------------------------------------------
  */
 

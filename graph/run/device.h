@@ -60,6 +60,10 @@ rl_code rl_memory_copy(rl_memory *to, rl_memory *from, rl_error *err);
  * compiler's first lines; warnings are errors for `strict`. `name` is for messages. */
 rl_code rl_program_build(rl_device *device, const char *name, const char *text, bool strict, rl_program **out,
                          rl_error *err);
+/* That the program has a kernel of that name; otherwise RL_E_BUILD at `where`: "<what> has no kernel 'x'",
+ * and which ones it has. Makes none, so that binaries are not saved before they hold machine code. */
+rl_code rl_program_check(const rl_program *program, const char *entry, const char *what, rl_where where,
+                         rl_error *err);
 /* The same program for another holder, who frees it too; NULL for NULL. Not while others build or free. */
 rl_program *rl_program_share(rl_program *program);
 void rl_program_free(rl_program **program);

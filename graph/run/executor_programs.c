@@ -1,4 +1,5 @@
 /* The programs of an executor: their texts, and building them. */
+#include <stdio.h>
 #include <string.h>
 
 #include "graph/base/pool.h"
@@ -78,6 +79,23 @@ static rl_code build_texts(build_job *job, int threads, rl_error *err)
     return code;
 }
 
+/* Names of kernels come from pipelines, too; a wrong one is not the fault of a frame. */
+static rl_code check_kernels(rl_executor *x, rl_error *err)
+{
+    rl_code code = RL_OK;
+    for (size_t i = 0; i < x->plan->n_steps && !code; i++) {
+        const rl_plan_step *s = &x->plan->steps[i];
+        if (s->kind != RL_STEP_KERNEL)
+            continue;
+        const rl_graph_node *g = &x->plan->graph->nodes[s->node];
+        char what[256];
+        snprintf(what, sizeof what, "pass '%s' (%s)", g->name, g->pass->name);
+        code = rl_program_check(x->nodes[s->node].program, g->pass->steps.rows[s->step].entry, what, g->where,
+                                err);
+    }
+    return code;
+}
+
 rl_code rl_executor_build(rl_executor *x, int threads, rl_error *err)
 {
     bool converts = false;
@@ -92,6 +110,8 @@ rl_code rl_executor_build(rl_executor *x, int threads, rl_error *err)
     rl_code code = write_texts(&job, err);
     if (!code && job.n)
         code = build_texts(&job, threads, err);
+    if (!code)
+        code = check_kernels(x, err);
     for (size_t i = 0; i < job.n; i++)
         rl_str_free(&job.texts[i]);
     return code;

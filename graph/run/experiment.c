@@ -45,6 +45,26 @@ static bool same_frames(const rl_sequence *a, const rl_sequence *b)
            !memcmp(a->frames.numbers, b->frames.numbers, a->frames.n * sizeof *a->frames.numbers);
 }
 
+/* One file has many spellings; the manifest with that of its folder without links. */
+static rl_code print_spelled(const rl_manifest *m, rl_str *out, rl_error *err)
+{
+    rl_arena arena = {0};
+    rl_manifest copy = *m;
+    rl_code code = RL_OK;
+    copy.patterns = rl_arena_array(&arena, (size_t)m->n_patterns, sizeof *copy.patterns);
+    for (int i = 0; i < m->n_patterns && copy.patterns && !code; i++) {
+        copy.patterns[i] = m->patterns[i];
+        copy.patterns[i].path = rl_path_real(&arena, m->patterns[i].path);
+        code = copy.patterns[i].path ? RL_OK : RL_E_MEMORY;
+    }
+    if (!copy.patterns || code)
+        code = rl_fail_memory(err, (size_t)m->n_patterns * sizeof *copy.patterns);
+    else
+        rl_manifest_print(&copy, out);
+    rl_arena_free(&arena);
+    return !code && out->failed ? rl_fail_memory(err, out->room) : code;
+}
+
 static rl_code check_captures(const rl_experiment *x, rl_error *err)
 {
     const rl_session *first = x->sessions[0];
@@ -54,17 +74,17 @@ static rl_code check_captures(const rl_experiment *x, rl_error *err)
         for (size_t k = 0; k < s->n_sequences && !what; k++) {
             const rl_sequence *a = &first->sequences[k], *b = &s->sequences[k];
             rl_str left = {0}, right = {0};
-            rl_manifest_print(a->manifest, &left);
-            rl_manifest_print(b->manifest, &right);
-            bool failed = left.failed || right.failed;
+            rl_code code = print_spelled(a->manifest, &left, err);
+            if (!code)
+                code = print_spelled(b->manifest, &right, err);
             if (strcmp(rl_str_text(&left), rl_str_text(&right)))
                 what = "another capture";
             else if (!same_frames(a, b))
                 what = "other frames";
             rl_str_free(&left);
             rl_str_free(&right);
-            if (failed)
-                return rl_fail_memory(err, 1);
+            if (code)
+                return code;
         }
         if (what)
             return rl_fail_file(err, RL_E_CONFIG, x->variants[i].pipeline,

@@ -148,13 +148,27 @@ static rl_code add_light(const rl_session *s, rl_sequence *q, const rl_light_spe
     return code;
 }
 
+/* The pipeline's lights, else the capture's. Paths into lights that no file of the pipeline lists
+ * (`--set lights.key.exposure=1`) change the capture's. */
+static rl_code choose_lights(rl_session *s, const rl_manifest *m, rl_lights *out, rl_error *err)
+{
+    const rl_value *lights = s->pipeline->lights;
+    *out = m->lights;
+    if (!lights)
+        return RL_OK;
+    if (lights->implied && m->lights_written) {
+        lights = rl_value_merge(&s->arena, m->lights_written, (rl_value *)lights);
+        if (!lights)
+            return rl_fail_memory(err, sizeof *lights);
+    }
+    return rl_lights_parse(&s->arena, lights, m->unit, out, err);
+}
+
 rl_code rl_session_lights(rl_session *s, rl_sequence *q, rl_error *err)
 {
     const rl_manifest *m = q->manifest;
-    rl_lights lights = m->lights;
-    rl_code code = RL_OK;
-    if (s->pipeline->lights)
-        code = rl_lights_parse(&s->arena, s->pipeline->lights, m->unit, &lights, err);
+    rl_lights lights;
+    rl_code code = choose_lights(s, m, &lights, err);
     q->lights = rl_arena_array(&s->arena, lights.n + 1, sizeof *q->lights);
     if (!code && !q->lights)
         code = rl_fail_memory(err, lights.n * sizeof *q->lights);

@@ -24,17 +24,6 @@ typedef struct lister {
     size_t n;
 } lister;
 
-/* A path whose folder has no links, so that one file has one spelling; as it is when there is no such folder.
- */
-static const char *resolve(rl_arena *arena, const char *path)
-{
-    char *folder = rl_path_folder(arena, path),
-         *real = folder ? realpath(*folder ? folder : ".", NULL) : NULL;
-    const char *out = real ? rl_path_join(arena, real, rl_path_name(path)) : path;
-    free(real);
-    return out;
-}
-
 static rl_code spell(const lister *l, rl_arena *arena, const written *w, const char **out, rl_error *err)
 {
     const rl_manifest *m = l->s->sequences[w->sequence].manifest;
@@ -42,7 +31,7 @@ static rl_code spell(const lister *l, rl_arena *arena, const written *w, const c
     if (w->output >= INPUT) {
         const rl_layer layer = {.pattern = w->output - INPUT};
         const char *path = rl_manifest_path(arena, m, &layer, w->frame);
-        *out = path ? resolve(arena, path) : NULL;
+        *out = path ? rl_path_real(arena, path) : NULL;
     } else {
         code =
             rl_output_path(arena, l->s->outputs[w->output].spec, m->name, w->frame, l->s->variant, out, err);

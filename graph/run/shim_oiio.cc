@@ -1,14 +1,21 @@
 #include "graph/run/shim_oiio.h"
 
+#include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imagebuf.h>
 #include <OpenImageIO/imagebufalgo.h>
 #include <OpenImageIO/imageio.h>
+#include <OpenImageIO/strutil.h>
 #include <fontconfig/fontconfig.h>
 
+#include <cerrno>
 #include <cstdio>
+#include <cstring>
 #include <exception>
 #include <memory>
 #include <string>
+#include <system_error>
+
+#include <sys/mman.h>
 
 #define EXPORT __attribute__((visibility("default")))
 
@@ -64,20 +71,95 @@ static OIIO::ImageSpec spec_of(const rl_oiio_image *image)
     return spec;
 }
 
+/* Most writers lose what goes wrong when they close, with a full disk the last part of a file; the one of
+ * JPEG ends the process. So they never see the disk: they write through a proxy into a FILE of ours, which
+ * remembers. Those that know no proxies, and TIFF's, which reads what it has written, get a file in memory,
+ * which is copied. */
+struct file_proxy : OIIO::Filesystem::IOFile {
+    int error = 0; /* errno of the first failure */
+    bool hidden;   /* that it is a FILE */
+
+    file_proxy(FILE *f, bool hide) : IOFile(f, OIIO::Filesystem::IOProxy::Write), hidden(hide)
+    {
+    }
+
+    /* Of a "file" JPEG's writer takes the FILE itself. */
+    const char *proxytype() const override
+    {
+        return hidden ? "relit" : IOFile::proxytype();
+    }
+
+    size_t write(const void *data, size_t size) override
+    {
+        size_t done = IOFile::write(data, size);
+        if (done != size && !error)
+            error = errno ? errno : EIO;
+        return done;
+    }
+};
+
+struct file_closer {
+    void operator()(FILE *f) const
+    {
+        fclose(f);
+    }
+};
+
+using file_ptr = std::unique_ptr<FILE, file_closer>;
+
+/* Everything to the writer; closes it. */
+static bool put(OIIO::ImageOutput *output, const rl_oiio_image *image, const std::string &path)
+{
+    bool wide = image->type == RL_OIIO_HALF || image->type == RL_OIIO_FLOAT;
+    return output->open(path, spec_of(image)) &&
+           output->write_image(wide ? OIIO::TypeFloat : type_of(image->type), image->pixels) &&
+           output->close();
+}
+
+/* Throws errno. */
+static void copy(FILE *from, FILE *to)
+{
+    char block[65536];
+    size_t n;
+    rewind(from);
+    while ((n = fread(block, 1, sizeof block, from)) > 0)
+        if (fwrite(block, 1, n, to) != n)
+            throw std::system_error(errno, std::generic_category());
+    if (ferror(from))
+        throw std::system_error(EIO, std::generic_category());
+}
+
 static int write_image(const rl_oiio_image *image, char *message, size_t size)
 {
     try {
+        file_ptr file(fopen(image->path, "wbe"));
+        if (!file)
+            return failed(strerror(errno), message, size);
+        bool jpeg = OIIO::Strutil::starts_with(image->format, "jp");
+        file_proxy proxy(file.get(), jpeg); /* outlives `output` */
         std::unique_ptr<OIIO::ImageOutput> output = OIIO::ImageOutput::create(image->format);
         if (!output)
             return failed(OIIO::geterror(), message, size);
         if (!output->supports("alpha") && (image->channels == 2 || image->channels == 4))
             return failed("the format has no alpha channel", message, size);
-        bool wide = image->type == RL_OIIO_HALF || image->type == RL_OIIO_FLOAT;
-        if (!output->open(image->path, spec_of(image)) ||
-            !output->write_image(wide ? OIIO::TypeFloat : type_of(image->type), image->pixels) ||
-            !output->close())
-            return failed(output->geterror(), message, size);
-        return 0;
+        bool tiff = OIIO::Strutil::starts_with(image->format, "tif");
+        if (!tiff && output->supports("ioproxy") && output->set_ioproxy(&proxy)) {
+            bool done = put(output.get(), image, image->path);
+            if (proxy.error)
+                return failed(strerror(proxy.error), message, size);
+            if (!done)
+                return failed(output->geterror(), message, size);
+        } else {
+            int fd = memfd_create("relit", MFD_CLOEXEC);
+            file_ptr memory(fd < 0 ? nullptr : fdopen(fd, "rb"));
+            if (!memory)
+                return failed(strerror(errno), message, size);
+            if (!put(output.get(), image, "/proc/self/fd/" + std::to_string(fd)))
+                return failed(output->geterror(), message, size);
+            copy(memory.get(), file.get());
+        }
+        errno = EIO;
+        return fflush(file.get()) || ferror(file.get()) ? failed(strerror(errno), message, size) : 0;
     } catch (...) {
         return caught(message, size);
     }

@@ -1,7 +1,8 @@
 /* --against FILE|DIR: the images that variants are compared with come from files.
  *
  *   a file      of every frame, or with #### or %04d one for each frame
- *   a folder    files named as the outputs of the variant that show the compared image: an EXR without
+ *   a folder    of an earlier run, or of an earlier comparison with a folder a variant: files named as the
+ * outputs of the variant that show the compared image: an EXR without
  * display, look and exposure gives the linear one, an integer file for the compared display the other
  *
  * EXR and float files are scene-linear, files of integers are for the display. What a file's half floats
@@ -68,15 +69,20 @@ static rl_compared shows(const rl_ab_against *a, int variant, const rl_sink_outp
     return RL_COMPARED;
 }
 
-/* Below the folder as the output names it, else right in the folder; NULL when there is neither. */
-static rl_code find_in_folder(const rl_ab_against *a, rl_arena *arena, const char *name, const char **out,
-                              rl_error *err)
+/* Below the folder's own folder of the variant, which an earlier `relit ab` left, else below the folder; as
+ * the output names it, else without the folders of that name. NULL when there is none. */
+static rl_code find_in_folder(const rl_ab_against *a, rl_arena *arena, const char *variant, const char *name,
+                              const char **out, rl_error *err)
 {
-    const char *whole = rl_path_join(arena, a->plan->against, name);
-    const char *flat = rl_path_join(arena, a->plan->against, rl_path_name(name));
-    if (!whole || !flat)
-        return rl_fail_memory(err, strlen(name));
-    *out = rl_path_exists(whole) ? whole : rl_path_exists(flat) ? flat : NULL;
+    const char *own = rl_path_join(arena, a->plan->against, variant);
+    const char *const folders[] = {own, a->plan->against}, *const names[] = {name, rl_path_name(name)};
+    *out = NULL;
+    for (int i = 0; i < 4 && !*out; i++) {
+        const char *path = own ? rl_path_join(arena, folders[i / 2], names[i % 2]) : NULL;
+        if (!path)
+            return rl_fail_memory(err, strlen(name));
+        *out = rl_path_exists(path) ? path : NULL;
+    }
     return RL_OK;
 }
 
@@ -88,12 +94,11 @@ static rl_code find_outputs(const rl_ab_against *a, rl_arena *arena, const rl_ex
     rl_str looked_for = {0};
     for (size_t i = 0; i < s->n_outputs; i++) {
         rl_compared which = shows(a, variant, &s->outputs[i]);
-        const char *name;
+        const char *name, *own = a->plan->variants[variant].name;
         if (which == RL_COMPARED || out->path[which])
             continue;
-        if (rl_output_path(arena, s->outputs[i].spec, capture, frame->frame, a->plan->variants[variant].name,
-                           &name, err) ||
-            find_in_folder(a, arena, name, &out->path[which], err))
+        if (rl_output_path(arena, s->outputs[i].spec, capture, frame->frame, own, &name, err) ||
+            find_in_folder(a, arena, own, name, &out->path[which], err))
             goto done;
         rl_str_printf(&looked_for, "%s'%s'", looked_for.length ? " and " : "", rl_path_name(name));
     }
@@ -101,8 +106,10 @@ static rl_code find_outputs(const rl_ab_against *a, rl_arena *arena, const rl_ex
         goto done;
     if (looked_for.length)
         rl_fail_file(err, RL_E_IO, a->plan->against,
-                     "--against: there is no file for variant '%s', frame %lld; looked for %s",
-                     a->plan->variants[variant].name, frame->frame, rl_str_text(&looked_for));
+                     "--against: there is no file for variant '%s', frame %lld; looked for %s, there and "
+                     "in its folder '%s'",
+                     a->plan->variants[variant].name, frame->frame, rl_str_text(&looked_for),
+                     a->plan->variants[variant].name);
     else
         rl_fail_file(err, RL_E_CONFIG, a->plan->against,
                      "--against: variant '%s' has no output whose files could be in the folder: one image, "

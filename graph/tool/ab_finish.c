@@ -20,7 +20,8 @@ typedef struct finish {
     rl_ab_results results;
     rl_ab_report report;
     rl_ab_verdict *verdicts;
-    rl_str metrics; /* the text of metrics.json */
+    rl_str metrics;   /* the text of metrics.json */
+    bool page, sheet; /* were written */
     rl_error *err;
 } finish;
 
@@ -94,8 +95,10 @@ static rl_code print_text(const finish *f)
     rl_cost_sentence(&cost, r->plan.n_variants, &out);
     if (r->plan.n_variants > r->plan.n_listed)
         rl_str_printf(&out, ", %zu of them for chance alone", r->plan.n_variants - r->plan.n_listed);
-    rl_str_printf(&out, "\n%s/%s\n", r->out, page_name);
-    if (r->sheet)
+    rl_str_add(&out, "\n");
+    if (f->page)
+        rl_str_printf(&out, "%s/%s\n", r->out, page_name);
+    if (f->sheet)
         rl_str_printf(&out, "%s\n", r->sheet_path);
     rl_code code = out.failed ? rl_fail_memory(f->err, out.length)
                               : rl_report_result(r->tool->report, rl_str_text(&out), f->err);
@@ -113,7 +116,7 @@ static rl_code print_json(const finish *f)
     rl_str_printf(&out, ", \"over\": %zu, \"out\": ", rl_ab_fail_count(&f->report));
     rl_ab_json_text(&out, r->out);
     rl_str_add(&out, ", \"sheet\": ");
-    if (r->sheet)
+    if (f->sheet)
         rl_ab_json_text(&out, r->sheet_path);
     else
         rl_str_add(&out, "null");
@@ -142,11 +145,9 @@ rl_code rl_ab_finish(rl_ab_run *r, double seconds, size_t *over, rl_error *err)
         return code;
     check_thresholds(&f);
     make_summary(&f);
-    if (!write_metrics(&f))
-        write_page(&f);
+    f.page = !write_metrics(&f) && !write_page(&f);
     write_junit(&f);
-    if (r->sheet)
-        rl_ab_sheet_write(r->sheet, r->sheet_path, err);
+    f.sheet = r->sheet && !rl_ab_sheet_write(r->sheet, r->sheet_path, err);
     if (r->tool->report->json)
         print_json(&f);
     else

@@ -90,6 +90,11 @@ rl_code rl_ab_page_new(const rl_ab_plan *plan, const rl_ab_page_source *source,
     return code;
 }
 
+const rl_frames *rl_ab_page_asked(const rl_ab_page *page)
+{
+    return &page->asked;
+}
+
 void rl_ab_page_free(rl_ab_page **out)
 {
     rl_ab_page *page = *out;

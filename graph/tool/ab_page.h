@@ -10,6 +10,7 @@
 #ifndef RL_TOOL_AB_PAGE_H
 #define RL_TOOL_AB_PAGE_H
 
+#include "graph/model/frames.h"
 #include "graph/tool/ab.h"
 
 /* Bytes that a page may have when nothing else is asked for. */
@@ -53,6 +54,9 @@ typedef struct rl_ab_page rl_ab_page;
 /* Keeps the pointers that it is given, until rl_ab_page_free. Bakes the displays (some 10 ms each). */
 rl_code rl_ab_page_new(const rl_ab_plan *plan, const rl_ab_page_source *source,
                        const rl_ab_page_options *options, rl_ab_page **out, rl_error *err);
+/* The frames that options.frames gives by number. */
+const rl_frames *rl_ab_page_asked(const rl_ab_page *page);
+
 void rl_ab_page_free(rl_ab_page **page);
 
 /* A frame and what was measured of it. Lives during the call. */

@@ -32,8 +32,10 @@ static bool manifest_marches(rl_arena *arena, const char *path)
 
 static bool some_light_marches(rl_arena *arena, const rl_pipeline *p, const char *const *captures, size_t n)
 {
-    if (p->lights)
-        return any_marches(p->lights);
+    if (any_marches(p->lights))
+        return true;
+    if (p->lights && !p->lights->implied)
+        return false; /* implied ones change the capture's: a march that they switch off costs seeds only */
     for (size_t i = 0; i < n; i++)
         if (manifest_marches(arena, captures[i]))
             return true;

@@ -7,6 +7,7 @@
 #include "graph/base/file.h"
 #include "graph/run/image_file.h"
 #include "graph/run/image_text.h"
+#include "graph/run/session.h"
 #include "graph/tool/ab_open.h"
 #include "graph/tool/ab_run.h"
 #include "graph/tool/outdir.h"
@@ -68,13 +69,31 @@ static rl_code open_sheet(rl_ab_run *r, rl_error *err)
     return code ? code : rl_ab_sheet_new(&r->plan, index, title, r->pool, &r->sheet, err);
 }
 
+/* As for --frames: a number that no capture has is a slip of the pen. */
+static rl_code check_report_frames(const rl_ab_run *r, rl_error *err)
+{
+    const rl_session *first = rl_experiment_session(r->experiment, 0);
+    const rl_frames *asked = rl_ab_page_asked(r->page);
+    for (size_t i = 0; i < asked->n; i++) {
+        bool found = false;
+        for (size_t c = 0; c < rl_session_captures(first) && !found; c++)
+            found = rl_frames_find(&first->sequences[c].frames, asked->numbers[i]) >= 0;
+        if (!found)
+            return rl_fail_file(err, RL_E_USAGE, "--report-frames",
+                                "frame %d is not among the frames of the run", asked->numbers[i]);
+    }
+    return RL_OK;
+}
+
 static rl_code open_page(rl_ab_run *r, rl_error *err)
 {
     rl_tool *tool = r->tool;
     const rl_ab_page_options options = {
         .folder = r->out, .frames = tool->args.report_frames, .pool = r->pool, .log = &tool->report->log};
     rl_code code = rl_ab_page_source_make(tool->arena, &r->plan, r->experiment, &r->source, err);
-    return code ? code : rl_ab_page_new(&r->plan, &r->source, &options, &r->page, err);
+    if (!code)
+        code = rl_ab_page_new(&r->plan, &r->source, &options, &r->page, err);
+    return code ? code : check_report_frames(r, err);
 }
 
 static rl_code open_all(rl_ab_run *r, rl_error *err)
@@ -153,7 +172,8 @@ static int run_all(rl_ab_run *r, rl_error *err)
     rl_code run = rl_experiment_run(r->experiment, &hooks, &summary, err), finish = RL_OK;
     int signal = rl_signals_caught();
     rl_signals_end();
-    rl_report_run_end(report, &summary, run == RL_E_CANCELLED);
+    if (!run || summary.frames || run == RL_E_CANCELLED) /* not: kernels that do not compile */
+        rl_report_run_end(report, &summary, run == RL_E_CANCELLED);
     if (!run || r->frames)
         finish = rl_ab_finish(r, now_s() - begin, &over, &unwritten);
     if (!finish && r->trace)
