@@ -392,7 +392,7 @@ static inline void scatter_account(floatv *out, int c, floatv own, float share, 
 
 /* A result's part of the ledger, of the pixels at `at`; planes are `plane` floats apart. */
 #define SCATTER_KEEP_LEDGER(out, plane, at)                                                                  \
-    RL_UNROLL
+    RL_UNROLL                                                                                                \
     for (int c = 0; c < 3; c++) {                                                                            \
         rl_vstore((out)[3 + c], 0, border + c * (plane) + (at));                                             \
         rl_vstore((out)[6 + c], 0, off_screen + c * (plane) + (at));                                         \

@@ -84,7 +84,7 @@ static const json_t *find(const json_t *root, int variant, const char *node, con
 static void test_rows(void **state)
 {
     (void)state;
-    tool_result r = AB("--vary", "profiles.skin.border=renormalize,occlude");
+    tool_result r = AB("--vary", "profiles.skin.border=renormalize,occlude", "--fail-over", "energy=1000");
     if (r.status)
         fail_msg("%s%s", r.out, r.err);
     json_t *root = metrics();
@@ -104,6 +104,31 @@ static void test_rows(void **state)
         }
     json_decref(root);
     tool_result_free(&r);
+}
+
+/* Without a limit only the last frame's is kept, by a run of its own: the filters' rows are the same. */
+static void test_last_frame(void **state)
+{
+    (void)state;
+    tool_result r = AB("--vary", "graph.sss.taps=21,55", "--fail-over", "energy=1000");
+    assert_int_equal(r.status, 0);
+    tool_result_free(&r);
+    json_t *all = metrics();
+    r = AB("--vary", "graph.sss.taps=21,55");
+    assert_int_equal(r.status, 0);
+    assert_null(strstr(r.err, "warning"));
+    tool_result_free(&r);
+    json_t *root = metrics();
+    const json_t *list = json_object_get(root, "energy");
+    for (size_t i = 0; i < json_array_size(list); i++)
+        assert_int_equal(json_integer_value(json_object_get(json_array_get(list, i), "frame")), SMALL_FRAMES);
+    for (int variant = 0; variant < 2; variant++) {
+        const json_t *one = find(root, variant, "sss", "skin", SMALL_FRAMES);
+        assert_true(json_equal(one, find(all, variant, "sss", "skin", SMALL_FRAMES)));
+        find(root, variant, "aa", NULL, SMALL_FRAMES);
+    }
+    json_decref(root);
+    json_decref(all);
 }
 
 /* renormalize keeps what occlude loses: the first is below a limit that the second exceeds. */
@@ -165,6 +190,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_rows),
+        cmocka_unit_test(test_last_frame),
         cmocka_unit_test(test_fail_over),
         cmocka_unit_test(test_nothing_to_check),
         cmocka_unit_test(test_no_picture),

@@ -23,6 +23,8 @@ typedef struct rl_ab_run {
     const char *sheet_path;
     rl_trace *trace; /* NULL without --trace */
     rl_energy_ledger energy;
+    rl_experiment **ledgers; /* whose nodes its rows name, where they are not the experiment's */
+    size_t n_ledgers;
     rl_ab_failure *failures;
     size_t n_failures, room_failures;
     size_t frames; /* that were compared */
@@ -30,6 +32,9 @@ typedef struct rl_ab_run {
 
 /* Hooks of the run, ctx is an rl_ab_run. A frame that cannot be measured is a frame that failed. */
 void rl_ab_run_hooks(rl_ab_run *run, rl_experiment_hooks *out);
+
+/* ab_ledger.c: adds the ledger of energy of each capture's last frame to run->energy. */
+rl_code rl_ab_ledger(rl_ab_run *run, rl_error *err);
 
 /* Writes metrics.json, junit.xml, report.html and the sheet, and prints the summary; *over is how many
  * thresholds are exceeded. */

@@ -27,6 +27,8 @@ static rl_code read_thresholds(rl_ab_run *r, rl_error *err)
     for (size_t i = 0; i < a->n_fail_over && !code; i++)
         code = rl_threshold_parse(r->tool->arena, place, a->fail_over[i], true, &r->thresholds[i], err);
     r->n_thresholds = a->n_fail_over;
+    for (size_t i = 0; i < a->n_fail_over && !code; i++) /* then every frame's energy is needed */
+        r->tool->args.run.energy |= r->thresholds[i].metric == RL_THRESHOLD_ENERGY;
     return code;
 }
 
@@ -129,6 +131,8 @@ static void close_all(rl_ab_run *r)
     rl_pool_free(&r->pool);
     rl_trace_free(&r->trace);
     rl_energy_ledger_free(&r->energy);
+    for (size_t i = 0; i < r->n_ledgers; i++)
+        rl_experiment_close(&r->ledgers[i]);
     rl_free(r->failures);
 }
 
@@ -156,6 +160,16 @@ static int status_of(rl_code run, rl_code finish, const rl_run_summary *summary,
     return over ? RL_EXIT_OVER : RL_EXIT_DONE;
 }
 
+/* The report without a ledger is still one. */
+static void add_ledger(rl_ab_run *r)
+{
+    rl_error err = {0};
+    if (!rl_ab_ledger(r, &err) || err.code == RL_E_CANCELLED)
+        return;
+    rl_report(&r->tool->report->log, RL_WARNING, (rl_where){err.file, err.line, err.column},
+              "the report has no ledger of energy: %s", err.text);
+}
+
 /* All frames, then the report of those that were compared, also when a signal ended the run. */
 static int run_all(rl_ab_run *r, rl_error *err)
 {
@@ -170,6 +184,8 @@ static int run_all(rl_ab_run *r, rl_error *err)
     rl_signals_begin(fileno(report->err));
     rl_report_run_begin(report);
     rl_code run = rl_experiment_run(r->experiment, &hooks, &summary, err), finish = RL_OK;
+    if (!run && r->frames && !r->tool->args.run.energy)
+        add_ledger(r);
     int signal = rl_signals_caught();
     rl_signals_end();
     if (!run || summary.frames || run == RL_E_CANCELLED) /* not: kernels that do not compile */
@@ -188,7 +204,6 @@ int rl_cmd_ab(rl_tool *tool, rl_error *err)
     rl_ab_run run = {.tool = tool};
     if (!tool->args.run.out)
         tool->args.run.out = "out/ab";
-    tool->args.run.energy = true;
     tool->report->resumes = false;
     run.out = tool->args.run.out;
     int status = open_all(&run, err) ? RL_EXIT_WRONG : run_all(&run, err);

@@ -173,8 +173,9 @@ class Sections {
     draw(variants[0]);
     return this.section("energy", "Energy",
       variants.length > 1 ? h("div", {class: "controls"}, control("Variant", "energy-variant", pick)) : null,
-      h("div", {}, h("p", {class: "small"}, "What passes take in and give out a pixel: the mean of red, green and blue, and of " +
-                     "the frames. The rest are shares of what came in."), box));
+      h("div", {}, h("p", {class: "small"}, "What passes take in and give out a pixel: the mean of red, green and blue, " +
+                     (new Set(list.map(r => r.frame)).size > 1 ? "and of the frames" : "in frame " + list[0].frame) +
+                     ". The rest are shares of what came in."), box));
   }
 
   energyTable(list) {
