@@ -189,10 +189,8 @@ static void test_no_picture(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_rows),
-        cmocka_unit_test(test_last_frame),
-        cmocka_unit_test(test_fail_over),
-        cmocka_unit_test(test_nothing_to_check),
+        cmocka_unit_test(test_rows),       cmocka_unit_test(test_last_frame),
+        cmocka_unit_test(test_fail_over),  cmocka_unit_test(test_nothing_to_check),
         cmocka_unit_test(test_no_picture),
     };
     return cmocka_run_group_tests(tests, setup, teardown);
