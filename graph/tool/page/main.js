@@ -14,7 +14,9 @@ function facts(metrics, page) {
   const failed = page.frames.filter(f => f.error).length, cost = metrics.cost, list = [];
   for (const c of captures) list.push(`${c.name}: ${plural((c.frames || []).length, "frame")}, ${c.width}\u00d7${c.height}`);
   list.push(plural((metrics.variants || []).length, "variant"));
-  if (cost && typeof cost.factor === "number") list.push(`${fixed(cost.factor, 2)}\u00d7 the cost of one`);
+  const seeds = cost ? cost.variants - (metrics.variants || []).length : 0; /* variants with other seeds cost too */
+  if (cost && typeof cost.factor === "number")
+    list.push(`${fixed(cost.factor, 2)}\u00d7 the cost of one` + (seeds > 0 ? `, with ${seeds} more seeds` : ""));
   const items = list.map(x => h("li", {}, x));
   if ((metrics.thresholds || []).length) items.push(h("li", {class: over ? "bad" : "good"}, over ? "thresholds exceeded" : "within thresholds"));
   if (failed) items.push(h("li", {class: "bad"}, `${plural(failed, "frame")} failed`));
