@@ -7,6 +7,7 @@
 
 #include <jansson.h>
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -131,6 +132,24 @@ static void test_last_frame(void **state)
     json_decref(all);
 }
 
+/* The last frame cannot be read: that the ledger lacks it is said. */
+static void test_no_last_frame(void **state)
+{
+    (void)state;
+    char *last = path_in(folder, "s.0003.exr"), *away = path_in(folder, "s.away");
+    assert_int_equal(rename(last, away), 0);
+    tool_result r = AB("--vary", "graph.sss.taps=21,55");
+    assert_int_equal(rename(away, last), 0);
+    assert_int_equal(r.status, 1);
+    assert_non_null(strstr(r.err, "the report's ledger of energy is not whole: "));
+    json_t *root = metrics();
+    assert_int_equal(json_array_size(json_object_get(root, "energy")), 0);
+    json_decref(root);
+    tool_result_free(&r);
+    free(last);
+    free(away);
+}
+
 /* renormalize keeps what occlude loses: the first is below a limit that the second exceeds. */
 static void test_fail_over(void **state)
 {
@@ -189,8 +208,11 @@ static void test_no_picture(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_rows),       cmocka_unit_test(test_last_frame),
-        cmocka_unit_test(test_fail_over),  cmocka_unit_test(test_nothing_to_check),
+        cmocka_unit_test(test_rows),
+        cmocka_unit_test(test_last_frame),
+        cmocka_unit_test(test_no_last_frame),
+        cmocka_unit_test(test_fail_over),
+        cmocka_unit_test(test_nothing_to_check),
         cmocka_unit_test(test_no_picture),
     };
     return cmocka_run_group_tests(tests, setup, teardown);

@@ -11,14 +11,15 @@
 typedef struct ledger_run {
     rl_ab_run *r;
     size_t capture, last; /* the frame's index in its run */
+    rl_error failed;      /* of a frame: the run itself goes on */
 } ledger_run;
 
 static rl_code on_frame(void *ctx, const rl_experiment_frame *f, rl_error *err)
 {
-    const ledger_run *l = ctx;
+    ledger_run *l = ctx;
     rl_code code = f->error->code;
-    if (code)
-        return rl_fail(err, code, RL_NOWHERE, "%s", f->error->text);
+    if (code && !l->failed.code)
+        l->failed = *f->error;
     for (size_t i = 0; i < f->n_energy && f->index == l->last && !code; i++) {
         rl_energy_row row = f->energy[i];
         row.capture = l->capture;
@@ -51,11 +52,15 @@ static rl_code run_capture(rl_ab_run *r, size_t capture, const rl_ab_plan *plan,
         options.n_captures = 1;
     }
     rl_experiment **x = &r->ledgers[r->n_ledgers++];
-    ledger_run l = {r, capture, n > 1};
+    ledger_run l = {.r = r, .capture = capture, .last = n > 1};
     rl_experiment_hooks hooks = {.frame = on_frame, .stop = on_stop, .ctx = &l};
     rl_run_summary summary;
     rl_code code = rl_ab_open(plan, &options, x, err);
-    return code ? code : rl_experiment_run(*x, &hooks, &summary, err);
+    if (!code)
+        code = rl_experiment_run(*x, &hooks, &summary, err);
+    if (!code && l.failed.code)
+        *err = l.failed;
+    return code ? code : l.failed.code;
 }
 
 rl_code rl_ab_ledger(rl_ab_run *r, rl_error *err)

@@ -164,10 +164,9 @@ static int status_of(rl_code run, rl_code finish, const rl_run_summary *summary,
 static void add_ledger(rl_ab_run *r)
 {
     rl_error err = {0};
-    if (!rl_ab_ledger(r, &err) || err.code == RL_E_CANCELLED)
-        return;
-    rl_report(&r->tool->report->log, RL_WARNING, (rl_where){err.file, err.line, err.column},
-              "the report has no ledger of energy: %s", err.text);
+    if (rl_ab_ledger(r, &err))
+        rl_report(&r->tool->report->log, RL_WARNING, (rl_where){err.file, err.line, err.column},
+                  "the report's ledger of energy is not whole: %s", err.text);
 }
 
 /* All frames, then the report of those that were compared, also when a signal ended the run. */
