@@ -278,7 +278,7 @@ static void test_unknown_names(void **state)
     assert_non_null(strstr(err.text, "no look 'film'"));
     rl_ocio *none = NULL;
     err = (rl_error){0};
-    assert_int_equal(rl_ocio_open("no/such.ocio", &none, &err), RL_E_COLOR);
+    assert_int_equal(rl_ocio_open("no/such.ocio", &none, &err), RL_E_IO);
     assert_null(none);
     assert_string_equal(err.file, "no/such.ocio");
 }

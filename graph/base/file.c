@@ -16,6 +16,9 @@ static rl_code io_error(rl_error *err, const char *path, const char *what)
     return rl_fail_file(err, RL_E_IO, path, "%s: %s", what, strerror(errno));
 }
 
+/* A pipe or a device that has more than this has no end (/dev/zero): far beyond any text that is read whole. */
+enum { STREAM_BYTES = 64 << 20 };
+
 static rl_code read_all(int fd, const char *path, char **data, size_t *size, rl_error *err)
 {
     struct stat st;
@@ -36,6 +39,11 @@ static rl_code read_all(int fd, const char *path, char **data, size_t *size, rl_
         if (n <= 0)
             break;
         used += (size_t)n;
+        if (used > STREAM_BYTES && !S_ISREG(st.st_mode)) {
+            code = rl_fail_file(err, RL_E_IO, path, "cannot be read: no file, and more than %d MiB come out of it",
+                                STREAM_BYTES >> 20);
+            break;
+        }
         if (used == room) { /* a pipe, or a file that grows */
             char *grown = rl_realloc(text, room * 2 + 1);
             if (!grown) {

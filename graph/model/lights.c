@@ -306,23 +306,6 @@ static rl_code check_keys(const rl_value *v, const rl_light_spec *l, rl_error *e
     return RL_OK;
 }
 
-/* A path into a light that is not there would make one that lacks all the rest. */
-static rl_code no_such_light(const rl_value *all, const rl_entry *e, rl_error *err)
-{
-    const char *known[64];
-    size_t n = 0;
-    rl_str text = {0};
-    for (size_t i = 0; i < all->n && n < sizeof known / sizeof *known; i++)
-        if (&all->entries[i] != e)
-            known[n++] = all->entries[i].key;
-    rl_suggest(&text, e->key, known, n, "known");
-    rl_code code = rl_fail(err, RL_E_CONFIG, e->value->where,
-                           "there is no light '%s'%s (a new one needs 'type' and 'position' or 'direction')",
-                           e->key, rl_str_text(&text));
-    rl_str_free(&text);
-    return code;
-}
-
 static rl_code read_type(const rl_value *all, const rl_entry *e, rl_light_spec *l, rl_error *err)
 {
     static const char *const known[] = {
@@ -340,7 +323,7 @@ static rl_code read_type(const rl_value *all, const rl_entry *e, rl_light_spec *
     if (code)
         return code;
     if (!type && v->implied)
-        return no_such_light(all, e, err);
+        return rl_fail_absent(err, all, e, "there is no light", "'type' and 'position' or 'direction'");
     if (!type)
         return rl_fail(err, RL_E_CONFIG, v->where,
                        "light '%s' needs 'type': point, spot, directional, sphere or rect", e->key);

@@ -76,6 +76,7 @@ typedef struct rl_layer {
     bool from_preset; /* not the user's own: dropped by rl_manifest_bind when the file lacks it */
 
     const char *colorspace; /* albedo, emission, back_albedo */
+    rl_where colorspace_where;
     rl_space space;         /* normals */
     rl_encoding encoding;
     rl_depth_kind kind;   /* depths */

@@ -234,6 +234,7 @@ static rl_code read_layer(rl_manifest_reader *r, rl_layer_id id, const rl_entry 
     if (!code && has_key(type, "colorspace")) {
         const rl_value *v = stated(&l, "colorspace", "lin_rec709");
         layer->colorspace = "lin_rec709";
+        layer->colorspace_where = v ? v->where : layer->where;
         code = v ? rl_value_text(v, "colorspace", &layer->colorspace, r->err) : RL_OK;
     }
     const rl_value *part = rl_value_get(l.map, "part"),

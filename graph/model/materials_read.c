@@ -160,6 +160,30 @@ static rl_code check_profiles(reader *r)
     return code;
 }
 
+/* A path of --set into a profile that is not there makes one. Where no material uses it, it was meant for
+ * another, as a rule. */
+static void warn_stray(const reader *r, const rl_value *materials)
+{
+    for (size_t i = 0; r->profiles && i < r->profiles->n; i++) {
+        const rl_entry *profile = &r->profiles->entries[i];
+        bool used = !profile->value->implied;
+        const char *known[64];
+        size_t n = 0;
+        for (size_t k = 0; materials && k < materials->n && !used; k++) {
+            const rl_value *name = rl_value_get(materials->entries[k].value, "profile");
+            if (!name || name->kind != RL_TEXT)
+                continue;
+            used = !strcmp(name->text, profile->key);
+            if (n < sizeof known / sizeof *known)
+                known[n++] = name->text;
+        }
+        const char *near = used ? NULL : rl_nearest(profile->key, known, n);
+        if (!used)
+            rl_report(r->log, RL_WARNING, profile->value->where, "no material uses the profile '%s'%s%s%s",
+                      profile->key, near ? "; did you mean '" : "", near ? near : "", near ? "'?" : "");
+    }
+}
+
 static rl_code unknown_profile(reader *r, const rl_value *v)
 {
     size_t n = r->profiles ? r->profiles->n : 0;
@@ -304,9 +328,11 @@ rl_code rl_materials_resolve_from(const rl_registry *registry, rl_arena *arena, 
         code = read_material(&r, i, &materials->entries[i - 1]);
     if (!code)
         code = rl_ids_finish(&r.ids, m, err);
-    if (!code)
-        *out = m;
-    return code;
+    if (code)
+        return code;
+    warn_stray(&r, materials);
+    *out = m;
+    return RL_OK;
 }
 
 rl_code rl_materials_resolve(rl_arena *arena, const rl_value *profiles, const rl_value *shading,

@@ -52,6 +52,8 @@ static rl_code find_pass(parser *q, const rl_entry *entry, const rl_pass **out)
 {
     const rl_value *v;
     const char *name = NULL;
+    if (entry->value->implied && !rl_value_get(entry->value, "pass"))
+        return rl_fail_absent(q->err, rl_value_get(q->p->root, "graph"), entry, "the graph has no entry", "'pass'");
     rl_code code = rl_value_need(entry->value, "pass", "graph entry", entry->key, "the pass that it runs",
                                  entry->where, &v, q->err);
     if (!code)
@@ -161,6 +163,14 @@ static rl_code read_graph(parser *q, const rl_value *graph)
     return code;
 }
 
+rl_code rl_pipeline_set(rl_arena *arena, rl_value **root, const char *path, rl_value *v, rl_error *err)
+{
+    const rl_value *lights = rl_value_get(*root, "lights");
+    if (!strncmp(path, "lights.", 7) && (!lights || lights->implied))
+        return rl_value_patch(arena, root, path, v, err);
+    return rl_value_set(arena, root, path, v, err);
+}
+
 /* ---- the other sections
  * ---------------------------------------------------------------------------------------- */
 
@@ -206,6 +216,8 @@ static rl_code read_color(parser *q)
     const rl_value *config = rl_value_get(color, "config"), *working = rl_value_get(color, "working");
     const char *text;
     q->p->color_where = working ? working->where : config ? config->where : color->where;
+    if (config)
+        q->p->ocio_where = config->where;
     if (working)
         code = rl_value_text(working, "working", &q->p->working, q->err);
     if (!code && config)

@@ -45,7 +45,8 @@ typedef struct rl_output {
     rl_where file_where;
     const char *colorspace;            /* or NULL */
     const char *display, *view, *look; /* or NULL */
-    rl_where color_where;
+    rl_where color_where;              /* of colorspace or display, else of the output */
+    rl_where view_where, look_where;   /* of what is given */
     double exposure;    /* stops */
     rl_pixel_type type; /* given, or the file type's default: half for EXR, uint8 for PNG and JPEG, … */
     const char *compression; /* EXR: lower case name, default "zip"; TIFF: none|lzw|zip; NULL = the writer's
@@ -63,6 +64,7 @@ typedef struct rl_pipeline {
     const rl_value *root;    /* merged; the parts below point into it */
     const rl_value *capture; /* a path (text) or an inline manifest (map); NULL = must come from --capture */
     const char *ocio_config; /* path resolved against the file that names it, or NULL */
+    rl_where ocio_where;
     const char *working;     /* working colour space, or NULL: the config's scene_linear role */
     rl_where color_where;
     const rl_value *profiles, *shading, *materials; /* maps or NULL, see materials.h */
@@ -73,6 +75,10 @@ typedef struct rl_pipeline {
     const rl_output *outputs;
     size_t n_outputs;
 } rl_pipeline;
+
+/* --set and --vary: rl_value_set on a pipeline's tree. A path into `lights` where the pipeline lists none is one
+ * into the capture's, known later only: `null` stays there, until the two are merged. */
+rl_code rl_pipeline_set(rl_arena *arena, rl_value **root, const char *path, rl_value *v, rl_error *err);
 
 /* Parses a merged tree. User kernels (`pass: kernel`) become descriptors in the arena; their .cl file is read
  * here. Unknown keys, passes, parameters, ports: an error with the nearest name. Does not look at image names

@@ -170,6 +170,8 @@ static rl_code read_color(output_reader *r)
     const rl_value *view = rl_value_get(r->map, "view"), *look = rl_value_get(r->map, "look");
     const rl_value *exposure = rl_value_get(r->map, "exposure"), *first = space ? space : display;
     o->color_where = first ? first->where : o->where;
+    o->view_where = view ? view->where : o->color_where;
+    o->look_where = look ? look->where : o->color_where;
     rl_code code = read_text(r, "colorspace", &o->colorspace);
     if (!code)
         code = read_text(r, "display", &o->display);
@@ -248,7 +250,8 @@ static rl_code read_effort(output_reader *r)
     return code;
 }
 
-static rl_code read_output(rl_arena *arena, const rl_entry *entry, rl_output *o, rl_error *err)
+static rl_code read_output(rl_arena *arena, const rl_value *all, const rl_entry *entry, rl_output *o,
+                           rl_error *err)
 {
     static const char *const keys[] = {"image", "layers",   "file", "colorspace",  "display", "view",
                                        "look",  "exposure", "type", "compression", "quality", "level"};
@@ -259,6 +262,9 @@ static rl_code read_output(rl_arena *arena, const rl_entry *entry, rl_output *o,
     if (!what)
         return rl_fail_memory(err, strlen(o->name));
     rl_code code = rl_name_check(o->name, "an output", o->where, err);
+    if (!code && entry->value->implied && !rl_value_get(entry->value, "image") &&
+        !rl_value_get(entry->value, "layers"))
+        code = rl_fail_absent(err, all, entry, "there is no output", "'image' or 'layers', and 'file'");
     if (!code)
         code = rl_value_keys(entry->value, what, keys, RL_ARRAY_LENGTH(keys), err);
     if (!code)
@@ -301,7 +307,7 @@ rl_code rl_outputs_read(rl_arena *arena, const rl_value *map, const rl_output **
         return rl_fail_memory(err, count * sizeof *outputs);
     rl_code code = RL_OK;
     for (size_t i = 0; !code && i < count; i++)
-        code = read_output(arena, &map->entries[i], &outputs[i], err);
+        code = read_output(arena, map, &map->entries[i], &outputs[i], err);
     *out = outputs;
     *n = count;
     return code ? code : check_names(arena, outputs, count, err);

@@ -77,6 +77,8 @@ rl_value *rl_value_merge(rl_arena *arena, rl_value *base, rl_value *over);
 /* --set: puts v at a dotted path of *root, creating maps on the way; RL_NULL removes. List elements can be
  * replaced by index, not added. `where` names the option in errors. */
 rl_code rl_value_set(rl_arena *arena, rl_value **root, const char *path, rl_value *v, rl_error *err);
+/* The same in a tree that rl_value_merge lays over another: a null stays in it, and removes there. */
+rl_code rl_value_patch(rl_arena *arena, rl_value **root, const char *path, rl_value *v, rl_error *err);
 
 /* ---- checked reading of maps, for every parser of a config (value.c) ---- */
 
@@ -87,6 +89,11 @@ rl_code rl_value_keys(const rl_value *v, const char *what, const char *const *kn
 /* "<head> 'name'; did you mean 'y'? known: …", e.g. head "pass 'sss' (sss_burley) has no parameter". */
 rl_code rl_fail_unknown(rl_error *err, rl_where where, const char *head, const char *name,
                         const char *const *known, size_t n);
+
+/* A path of --set into an entry of `all` that nobody wrote: "<head> 'name'; did you mean …? known: … (a new one
+ * needs <needs>)". */
+rl_code rl_fail_absent(rl_error *err, const rl_value *all, const rl_entry *e, const char *head,
+                       const char *needs);
 
 /* "expected <expected>, found <describe>" at the place of v, with `name` in front: "'fov_x': expected …". */
 rl_code rl_value_wrong(const rl_value *v, const char *name, const char *expected, rl_error *err);

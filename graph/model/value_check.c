@@ -33,6 +33,23 @@ rl_code rl_fail_unknown(rl_error *err, rl_where where, const char *head, const c
     return code;
 }
 
+rl_code rl_fail_absent(rl_error *err, const rl_value *all, const rl_entry *e, const char *head,
+                       const char *needs)
+{
+    const char *known[64];
+    size_t n = 0;
+    rl_str text = {0};
+    for (size_t i = 0; i < all->n && n < sizeof known / sizeof *known; i++)
+        if (&all->entries[i] != e)
+            known[n++] = all->entries[i].key;
+    rl_suggest(&text, e->key, known, n, "known");
+    rl_code code = text.failed ? rl_fail_memory(err, text.room)
+                               : rl_fail(err, RL_E_CONFIG, e->value->where, "%s '%s'%s (a new one needs %s)",
+                                         head, e->key, rl_str_text(&text), needs);
+    rl_str_free(&text);
+    return code;
+}
+
 rl_code rl_value_keys(const rl_value *v, const char *what, const char *const *known, size_t n, rl_error *err)
 {
     char buf[96];

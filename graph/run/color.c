@@ -24,6 +24,8 @@ static rl_code unknown(const rl_ocio *ocio, rl_ocio_list list, const char *of, c
     else
         rl_str_printf(&text, "the colour configuration has no %s '%s'", what, name);
     rl_suggest(&text, name, names.names, names.n, "known");
+    if (!names.n)
+        rl_str_add(&text, ": it has none");
     code = rl_fail(err, RL_E_CONFIG, where, "%s", rl_str_text(&text));
 done:
     rl_str_free(&text);
@@ -69,9 +71,8 @@ rl_code rl_color_view(const rl_ocio *ocio, const char *display, const char *view
                       rl_where where, rl_error *err)
 {
     rl_code code = check_name(ocio, RL_OCIO_DISPLAYS, NULL, "display", display, where, err);
-    if (code != RL_OK)
-        return code;
-    code = check_name(ocio, RL_OCIO_VIEWS, display, "view", view, where, err);
+    if (code == RL_OK && view)
+        code = check_name(ocio, RL_OCIO_VIEWS, display, "view", view, where, err);
     if (code == RL_OK && look)
         code = check_name(ocio, RL_OCIO_LOOKS, NULL, "look", look, where, err);
     return code;

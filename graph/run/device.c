@@ -1,6 +1,7 @@
 /* Every cl* call of the engine. */
 #define CL_TARGET_OPENCL_VERSION 120
 #include "graph/run/device.h"
+#include "graph/run/device_home.h"
 
 #include <CL/cl.h>
 #include <stdatomic.h>
@@ -127,6 +128,7 @@ static size_t find_devices(cl_device_id *out)
     cl_platform_id platforms[16];
     cl_uint np = 0;
     size_t n = 0;
+    rl_device_home();
     if (CL(clGetPlatformIDs(16, platforms, &np)) != CL_SUCCESS)
         return 0;
     for (cl_uint p = 0; p < np && p < 16; p++) {

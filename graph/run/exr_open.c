@@ -107,7 +107,7 @@ static rl_code open_file(rl_exr *file, rl_error *err)
 {
     unsigned char magic[4] = {0};
     struct stat st;
-    file->fd = open(file->path, O_RDONLY | O_CLOEXEC);
+    file->fd = open(file->path, O_RDONLY | O_CLOEXEC | O_NONBLOCK); /* a pipe would wait for its writer */
     if (file->fd < 0 || fstat(file->fd, &st))
         return rl_fail_file(err, RL_E_IO, file->path, "cannot be opened: %s", strerror(errno));
     if (!S_ISREG(st.st_mode))

@@ -137,7 +137,20 @@ static rl_code pack(const rl_image_planes *image, rl_image_type type, rl_pool *p
 /* ---- writing
  * ------------------------------------------------------------------------------------------------ */
 
-#define OWN_ATTRIBUTES 7
+#define OWN_ATTRIBUTES 8
+
+/* TIFF and JPEG keep no text under names of our own: there all of it goes into the description. */
+static void describe(const rl_image_options *o, char *out, size_t size)
+{
+    size_t n = 0;
+    out[0] = 0;
+    for (size_t i = 0; i < o->notes_n; i++)
+        if (strchr(o->notes[i].name, ':') && n < size)
+            n += (size_t)snprintf(out + n, size - n, "%s%s = %s", n ? "; " : "", o->notes[i].name,
+                                  o->notes[i].text);
+    if (o->colorspace && n < size)
+        snprintf(out + n, size - n, "%srelit:colorspace = %s", n ? "; " : "", o->colorspace);
+}
 
 /* What a format's own tag can say: "sRGB" for the display of that name, whatever the view. */
 static const char *tag_of(const char *colorspace)
@@ -149,7 +162,8 @@ static const char *tag_of(const char *colorspace)
 }
 
 /* Formats keep text that they do not know as text, so each gets only what is meant for it. */
-static size_t fill_attributes(const char *path, const rl_image_options *o, rl_oiio_attribute *out)
+static size_t fill_attributes(const char *path, const rl_image_options *o, const char *description,
+                              rl_oiio_attribute *out)
 {
     const char *extension = rl_path_extension(path);
     int level = o->compression ? o->compression : 1;
@@ -169,6 +183,8 @@ static size_t fill_attributes(const char *path, const rl_image_options *o, rl_oi
         out[n++] = (rl_oiio_attribute){"CompressionQuality", NULL, o->quality ? o->quality : 95};
         out[n++] = (rl_oiio_attribute){"jpeg:subsampling", "4:4:4", 0};
     }
+    if (in_list(".tif,.tiff,.jpg,.jpeg", extension) && *description)
+        out[n++] = (rl_oiio_attribute){"ImageDescription", description, 0};
     if (o->colorspace) {
         out[n++] = (rl_oiio_attribute){"oiio:ColorSpace", tag_of(o->colorspace), 0};
         out[n++] = (rl_oiio_attribute){"relit:colorspace", o->colorspace, 0};
@@ -221,6 +237,8 @@ rl_code rl_image_file_write(const char *path, const rl_image_planes *image, cons
     code = pack(image, options->type, pool, pixels, counts ? counts : &unused, err);
     if (code != RL_OK)
         goto done;
+    char description[1024];
+    describe(options, description, sizeof description);
     rl_oiio_image packed = {.format = rl_path_extension(path) + 1,
                             .width = image->width,
                             .height = image->height,
@@ -230,7 +248,7 @@ rl_code rl_image_file_write(const char *path, const rl_image_planes *image, cons
                             .type = (rl_oiio_type)options->type,
                             .pixels = pixels,
                             .attributes = attributes,
-                            .attributes_n = fill_attributes(path, options, attributes)};
+                            .attributes_n = fill_attributes(path, options, description, attributes)};
     memcpy(packed.display, options->display, sizeof packed.display);
     if (packed.display[2] == 0)
         memcpy(packed.display, (int[4]){options->x, options->y, image->width, image->height},

@@ -192,9 +192,11 @@ rl_code rl_ledger_write(rl_ledger *l, int frame, rl_ledger_kind kind, uint64_t c
 /* Bytes of one file into a running hash. */
 static bool hash_file(XXH3_state_t *hash, const char *path, void *buffer, size_t room)
 {
-    int fd = open(path, O_RDONLY | O_CLOEXEC);
+    int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+    struct stat st;
     ssize_t n = -1;
-    while (fd >= 0 && (n = read(fd, buffer, room)) > 0)
+    bool plain = fd >= 0 && !fstat(fd, &st) && S_ISREG(st.st_mode); /* a pipe or a device may have no end */
+    while (plain && (n = read(fd, buffer, room)) > 0)
         XXH3_64bits_update(hash, buffer, (size_t)n);
     if (fd >= 0)
         close(fd);

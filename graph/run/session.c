@@ -18,7 +18,7 @@ static rl_code apply_settings(rl_session *s, rl_value **root, rl_error *err)
             return rl_fail_memory(err, strlen(set->path));
         code = rl_yaml_parse(&s->arena, set->value, strlen(set->value), name, &v, err);
         if (!code)
-            code = rl_value_set(&s->arena, root, set->path, v, err);
+            code = rl_pipeline_set(&s->arena, root, set->path, v, err);
     }
     return code;
 }

@@ -99,6 +99,8 @@ void rl_session_end_views(rl_session *session);
 
 /* session_color.c: opens the OCIO config, checks every colour name, makes the passes of the outputs. */
 rl_code rl_session_colors(rl_session *session, rl_error *err);
+/* Says which EXR outputs go without chromaticities. */
+void rl_session_note_primaries(const rl_session *session, const rl_graph *graph);
 /* The colour transform of an output as a pass, and what its file says of it. */
 rl_code rl_session_make_output(rl_session *session, const rl_output *spec, rl_sink_output *out,
                                rl_wanted *wanted, rl_error *err);

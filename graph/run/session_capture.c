@@ -1,7 +1,9 @@
 /* The captures of a session: manifest, frames, lights, materials, graph, plan. */
+#include <errno.h>
 #include <stdio.h>
 #include <string.h>
 #include <strings.h>
+#include <sys/stat.h>
 
 #include "graph/base/alloc.h"
 #include "graph/base/file.h"
@@ -76,6 +78,16 @@ static rl_code load_manifest(rl_session *s, const char *path, rl_sequence *q, rl
     const char *preset = NULL;
     rl_code code = find_preset(s, path, presets, &preset, err);
     return code ? code : rl_manifest_bare(&s->arena, path, preset, presets, s->log, &q->manifest, err);
+}
+
+/* The path that a pipeline gives: where nothing is, its line is at fault. */
+static rl_code load_named(rl_session *s, const rl_value *named, rl_sequence *q, rl_error *err)
+{
+    const char *path = rl_value_path(&s->arena, named);
+    struct stat st;
+    if (path && is_yaml(path) && stat(path, &st))
+        return rl_fail(err, RL_E_IO, named->where, "the capture '%s' cannot be opened: %s", path, strerror(errno));
+    return load_manifest(s, path, q, err);
 }
 
 /* Chooses among a preset's alternatives by what one frame's files hold. */
@@ -334,11 +346,13 @@ rl_code rl_session_sequences(rl_session *s, rl_error *err)
         if (o->n_captures)
             code = load_manifest(s, o->captures[i], q, err);
         else if (own->kind == RL_TEXT)
-            code = load_manifest(s, rl_value_path(&s->arena, own), q, err);
+            code = load_named(s, own, q, err);
         else
             code = rl_manifest_parse(&s->arena, own, presets, s->log, &q->manifest, err);
         if (!code)
             code = open_sequence(s, q, err);
     }
+    if (!code)
+        rl_session_note_primaries(s, s->sequences[0].graph);
     return code;
 }

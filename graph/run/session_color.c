@@ -3,23 +3,40 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 
+#include "graph/base/file.h"
 #include "graph/run/data_files.h"
 #include "graph/run/session.h"
 
 static rl_code open_config(rl_session *s, rl_error *err)
 {
-    const char *env = getenv("OCIO");
-    const char *path = s->options.ocio                           ? s->options.ocio
-                       : s->pipeline && s->pipeline->ocio_config ? s->pipeline->ocio_config
-                       : env && *env                             ? env
-                                     : rl_data_path(&s->arena, "color/relit.ocio");
+    const char *env = getenv("OCIO"), *path;
+    rl_where where = {0}; /* of who names it */
+    if (s->options.ocio) {
+        path = s->options.ocio;
+        where.file = "--ocio";
+    } else if (s->pipeline->ocio_config) {
+        path = s->pipeline->ocio_config;
+        where = s->pipeline->ocio_where;
+    } else if (env && *env) {
+        path = env;
+        where.file = "$OCIO";
+    } else {
+        path = rl_data_path(&s->arena, "color/relit.ocio");
+    }
     if (!path)
         return rl_fail(
             err, RL_E_COLOR, RL_NOWHERE,
             "relit's own colour config color/relit.ocio is not found; give --ocio FILE or set $RELIT_DATA to "
             "the folder that holds it");
-    return rl_ocio_open(path, &s->ocio, err);
+    rl_error why = {0};
+    rl_code code = rl_ocio_open(path, &s->ocio, &why);
+    if (code == RL_E_IO) /* whoever names it is at fault, not the file */
+        return rl_fail(err, code, where, "the colour configuration '%s' %s", path, why.text);
+    if (code && err)
+        *err = why;
+    return code;
 }
 
 /* Only rgb images are colours; the graph knows formats later, so a converting output must name images that
@@ -36,12 +53,15 @@ rl_code rl_session_make_output(rl_session *s, const rl_output *spec, rl_sink_out
     if (spec->display) {
         const char *view = spec->view;
         rl_ocio_names views = {0};
-        if (!view)
+        code = rl_color_view(s->ocio, spec->display, NULL, NULL, spec->color_where, err);
+        if (!code && !view)
             code = rl_ocio_list_names(s->ocio, RL_OCIO_VIEWS, spec->display, &s->arena, &views, err);
         if (views.n > 0) /* OpenColorIO lists the default first */
             view = views.names[0];
         if (!code)
-            code = rl_color_view(s->ocio, spec->display, view, spec->look, spec->color_where, err);
+            code = rl_color_view(s->ocio, spec->display, view, NULL, spec->view_where, err);
+        if (!code)
+            code = rl_color_view(s->ocio, spec->display, view, spec->look, spec->look_where, err);
         request.display = spec->display;
         request.view = view;
         out->space = code ? NULL : rl_arena_printf(&s->arena, "%s / %s", spec->display, view);
@@ -79,6 +99,40 @@ rl_code rl_session_make_output(rl_session *s, const rl_output *spec, rl_sink_out
                           .convert_params = params,
                           .n_layers = spec->n_layers};
     return RL_OK;
+}
+
+static bool has_rgb(const rl_graph *graph, const rl_graph_output *output)
+{
+    bool found = false;
+    for (size_t i = 0; i < output->n_images; i++)
+        found |= graph->images[output->images[i]].format == RL_RGB;
+    return found;
+}
+
+void rl_session_note_primaries(const rl_session *s, const rl_graph *graph)
+{
+    for (size_t i = 0; i < s->n_outputs; i++) {
+        const rl_sink_output *o = &s->outputs[i];
+        if (!o->primaries.known && !strcasecmp(rl_path_extension(o->spec->file), ".exr") &&
+            has_rgb(graph, &graph->outputs[i]))
+            rl_report(s->log, RL_NOTE, o->spec->color_where,
+                      "output '%s' has no chromaticities: '%s' is not linear RGB with known primaries",
+                      o->spec->name, o->space);
+    }
+}
+
+/* Light adds up in the working space. A configuration without the role aces_interchange cannot be asked. */
+static rl_code check_working(const rl_session *s, rl_error *err)
+{
+    rl_where where = s->pipeline->color_where;
+    rl_primaries primaries;
+    bool data = rl_ocio_is_data(s->ocio, s->working);
+    rl_code code = rl_color_primaries(s->ocio, s->working, where, &primaries, err);
+    if (!code && (data || (!primaries.known && rl_ocio_space(s->ocio, "aces_interchange"))))
+        rl_report(s->log, RL_WARNING, where,
+                  "the working space '%s' %s: light does not add up in it as it should; take a linear one",
+                  s->working, data ? "holds data, no colours" : "is not linear RGB");
+    return code;
 }
 
 /* The linear-light tone scale between lights given in lin_rec709 and the working space is a 3x3 matrix; OCIO
@@ -177,6 +231,8 @@ rl_code rl_session_colors(rl_session *s, rl_error *err)
         code = rl_color_space(s->ocio, s->pipeline->working, s->pipeline->color_where, &s->working, err);
     else if (!code)
         code = rl_color_working(s->ocio, s->pipeline->color_where, &s->working, err);
+    if (!code)
+        code = check_working(s, err);
     size_t most = s->pipeline->n_outputs + s->options.n_dump + 3; /* and the hidden ones */
     s->outputs = rl_arena_array(&s->arena, most, sizeof *s->outputs);
     s->wanted = rl_arena_array(&s->arena, most, sizeof *s->wanted);

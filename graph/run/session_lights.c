@@ -148,6 +148,22 @@ static rl_code add_light(const rl_session *s, rl_sequence *q, const rl_light_spe
     return code;
 }
 
+/* A path that removes a light of the capture's (`--set lights.fill=null`) must find it. */
+static rl_code check_removed(const rl_value *own, const rl_value *patch, rl_error *err)
+{
+    for (size_t i = 0; i < patch->n; i++) {
+        const rl_entry *e = &patch->entries[i];
+        const char *known[64];
+        size_t n = 0;
+        if (e->value->kind != RL_NULL || rl_value_get(own, e->key))
+            continue;
+        for (size_t k = 0; own && k < own->n && n < sizeof known / sizeof *known; k++)
+            known[n++] = own->entries[k].key;
+        return rl_fail_unknown(err, e->value->where, "the capture has no light", e->key, known, n);
+    }
+    return RL_OK;
+}
+
 /* The pipeline's lights, else the capture's. Paths into lights that no file of the pipeline lists
  * (`--set lights.key.exposure=1`) change the capture's. */
 static rl_code choose_lights(rl_session *s, const rl_manifest *m, rl_lights *out, rl_error *err)
@@ -156,7 +172,10 @@ static rl_code choose_lights(rl_session *s, const rl_manifest *m, rl_lights *out
     *out = m->lights;
     if (!lights)
         return RL_OK;
-    if (lights->implied && m->lights_written) {
+    if (lights->implied) {
+        rl_code code = check_removed(m->lights_written, lights, err);
+        if (code)
+            return code;
         lights = rl_value_merge(&s->arena, m->lights_written, (rl_value *)lights);
         if (!lights)
             return rl_fail_memory(err, sizeof *lights);

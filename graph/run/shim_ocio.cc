@@ -2,9 +2,13 @@
 
 #include <OpenColorIO/OpenColorIO.h>
 
+#include <cerrno>
 #include <cstring>
 #include <exception>
 #include <new>
+
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include "graph/base/alloc.h"
 #include "graph/run/shim_ocio_ops.hh"
@@ -52,9 +56,29 @@ template <typename T> static void destroy(T **object)
     }
 }
 
+/* The system's reason why a file cannot be read: OpenColorIO knows none. */
+static rl_code look_at(const char *path, rl_error *err)
+{
+    struct stat st;
+    if (stat(path, &st) || access(path, R_OK))
+        return rl_fail_file(err, RL_E_IO, path, "cannot be opened: %s", std::strerror(errno));
+    return S_ISDIR(st.st_mode) ? rl_fail_file(err, RL_E_IO, path, "cannot be read: it is a folder") : RL_OK;
+}
+
+/* What OpenColorIO says without what its message begins with: "Error: Loading the OCIO profile 'PATH' failed." */
+static const char *reason(const char *message)
+{
+    static const char failed[] = "' failed. ";
+    const char *behind = std::strstr(message, failed);
+    return behind ? behind + sizeof failed - 1 : message;
+}
+
 extern "C" rl_code rl_ocio_open(const char *path, rl_ocio **out, rl_error *err)
 {
     *out = nullptr;
+    rl_code seen = look_at(path, err);
+    if (seen != RL_OK)
+        return seen;
     rl_ocio *ocio = make<rl_ocio>();
     if (!ocio)
         return rl_fail_memory(err, sizeof *ocio);
@@ -64,7 +88,8 @@ extern "C" rl_code rl_ocio_open(const char *path, rl_ocio **out, rl_error *err)
         OCIO::SetLoggingLevel(OCIO::LOGGING_LEVEL_NONE);
         ocio->config = OCIO::Config::CreateFromFile(path);
     } catch (const std::exception &e) {
-        code = rl_fail_file(err, RL_E_COLOR, path, "%s", e.what());
+        code = rl_fail_file(err, RL_E_COLOR, path, "not a colour configuration that OpenColorIO can read: %s",
+                            reason(e.what()));
     } catch (...) {
         code = rl_fail_file(err, RL_E_COLOR, path, "OpenColorIO cannot read it");
     }
