@@ -79,9 +79,9 @@ $(BUILD)/librelit.a: $(LIB_O)
 	@rm -f $@
 	@ar rcs $@ $^
 
-$(BUILD)/librelit.so: $(LIB_O)
+$(BUILD)/librelit.so: $(LIB_O) graph/relit.map
 	$(call say,link $@)
-	$(Q)$(CC) $(LDFLAGS) -shared -Wl,-soname,librelit.so -o $@ $^ $(LIBS)
+	$(Q)$(CC) $(LDFLAGS) -shared -Wl,-soname,librelit.so -Wl,--version-script=graph/relit.map -o $@ $(LIB_O) $(LIBS)
 
 # All of the tool but main(): tests call it in their own process.
 $(BUILD)/tool.a: $(filter-out $(MAIN_O),$(TOOL_O))
@@ -228,13 +228,14 @@ docs-page: all
 
 install: all
 	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/lib/pkgconfig $(DESTDIR)$(PREFIX)/lib/relit \
-	  $(DESTDIR)$(PREFIX)/include/relit/graph/base $(DESTDIR)$(PREFIX)/share/relit/kernels
+	  $(DESTDIR)$(PREFIX)/include/relit/graph/base $(DESTDIR)$(PREFIX)/share/relit/kernels $(DESTDIR)$(PREFIX)/share/doc/relit
 	install -m 755 $(BUILD)/relit $(DESTDIR)$(PREFIX)/bin/
 	install -m 644 $(BUILD)/librelit.a $(BUILD)/librelit.so $(DESTDIR)$(PREFIX)/lib/
 	install -m 644 $(BUILD)/relit_oiio.so $(DESTDIR)$(PREFIX)/lib/relit/
 	install -m 644 graph/relit.h $(DESTDIR)$(PREFIX)/include/relit/graph/
 	install -m 644 graph/base/error.h graph/base/log.h $(DESTDIR)$(PREFIX)/include/relit/graph/base/
 	install -m 644 $(KERNELS) $(DESTDIR)$(PREFIX)/share/relit/kernels/
+	install -m 644 LICENSE $(DESTDIR)$(PREFIX)/share/doc/relit/
 	cp -R configs $(DESTDIR)$(PREFIX)/share/relit/
 	sed -e 's|@PREFIX@|$(PREFIX)|' -e 's|@VERSION@|$(VERSION)|' graph/relit.pc.in > $(DESTDIR)$(PREFIX)/lib/pkgconfig/relit.pc
 

@@ -467,6 +467,14 @@ static void test_file_errors(void **state)
     assert_int_equal(rl_file_read(folder, &data, &n, &err), RL_E_IO);
     assert_string_equal(err.text, "cannot be read: it is a folder");
     err = (rl_error){0};
+    assert_int_equal(rl_file_read("/dev/zero", &data, &n, &err), RL_E_IO); /* has no end */
+    assert_null(data);
+    err = (rl_error){0};
+    assert_int_equal(rl_file_probe(in_folder("no/such/f"), &err), RL_E_IO);
+    assert_int_equal(rl_file_probe(folder, &err), RL_E_IO);
+    assert_int_equal(rl_file_probe(in_folder("f"), &err), RL_OK);
+    assert_int_equal(count_files(), 0);
+    err = (rl_error){0};
     assert_int_equal(rl_file_write(in_folder("no/such/f"), "x", 1, &err), RL_E_IO);
     assert_string_equal(err.text, "cannot be written: No such file or directory");
     err = (rl_error){0};

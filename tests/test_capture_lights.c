@@ -95,6 +95,8 @@ static void test_paths(void **state)
     } rows[] = {
         {{{"lights.rim.enabled", "false"}, {"lights.key.efficacy", "100"}}, 2, SCENE_LIGHTS & ~SCENE_RIM},
         {{{"lights.rim.enabled", "true"}}, 1, SCENE_LIGHTS},
+        {{{"lights.rim", "null"}}, 1, SCENE_LIGHTS & ~SCENE_RIM},
+        {{{"lights.key.intensity", "null"}, {"lights.key.candela", "[2049, 1366, 683]"}}, 2, SCENE_LIGHTS},
         {{{"lights", "{}"}}, 1, 0}};
     static const char *const color[] = {"c.color"};
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
@@ -105,7 +107,7 @@ static void test_paths(void **state)
         scene s = truth(rows[i].lights, SCENE_KEY | SCENE_RIM);
         assert_int_equal(rl_session_process(r, 0, 1, NULL, &err), RL_OK);
         rl_image_view view = capture_image(r, "c.color");
-        assert_true(capture_error(&view, &s, SCENE_COLOR, 3, i < 2 ? 0 : 1) <= 4e-6);
+        assert_true(capture_error(&view, &s, SCENE_COLOR, 3, rows[i].lights ? 0 : 1) <= 4e-6);
         rl_session_close(&r);
         scene_free(&s);
     }

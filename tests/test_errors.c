@@ -10,6 +10,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include "graph/run/exr.h"
 #include "tests/tool_run.h"
@@ -74,13 +76,23 @@ static const row rows[] = {
     {"unknown profile", "profile: skin", "profile: skni", .at = "skni", .says = {"did you mean 'skin'?"}},
     {"unknown key of a profile", "scatter_distance_mm", "scatter_distance_m", .at = "scatter_distance_m", .says = {"did you mean 'scatter_distance_mm'?"}},
     {"unknown key of a material", "roughness: 0.45", "roughnes: 0.45", .at = "roughnes", .says = {"did you mean 'roughness'?"}},
-    {"unknown display", "display: sRGB", "display: sRBG", .says = {"pipe.yaml:", "did you mean 'sRGB'?"}},
-    {"unknown view", "view: ACES}", "view: ACSE}", .says = {"pipe.yaml:", "did you mean 'ACES'?"}},
-    {"unknown colour space", "display: sRGB, view: ACES", "colorspace: ACEScgg", .says = {"pipe.yaml:", "did you mean 'ACEScg'?"}},
+    {"unknown display", "display: sRGB", "display: sRBG", .at = "sRBG", .says = {"did you mean 'sRGB'?"}},
+    {"unknown view", "view: ACES}", "view: ACSE}", .at = "ACSE}", .says = {"did you mean 'ACES'?"}},
+    {"unknown view of --set", .arguments = {"--set", "outputs.view.view=ACSE"}, .says = {"--set outputs.view.view=ACSE:1:1: error:", "did you mean 'ACES'?"}},
+    {"unknown look", "view: ACES}", "view: ACES, look: warm}", .at = "warm}", .says = {"no look 'warm': it has none"}},
+    {"unknown colour space", "display: sRGB, view: ACES", "colorspace: ACEScgg", .at = "ACEScgg", .says = {"did you mean 'ACEScg'?"}},
+    {"layer in an unknown colour space", "colorspace: lin_rec709", "colorspace: lin_rec708", true, "lin_rec708", .says = {"did you mean 'lin_rec709'?"}},
+    {"no such colour configuration", "relit: 1\n", "relit: 1\ncolor: {config: gone.ocio}\n", .at = "gone.ocio", .says = {"gone.ocio' cannot be opened: No such file"}},
+    {"no such colour configuration of --ocio", .arguments = {"--ocio", "gone.ocio"}, .says = {"--ocio: error: the colour configuration 'gone.ocio' cannot be opened: No such file"}},
+    {"a folder as colour configuration", .arguments = {"--ocio", "/"}, .says = {"--ocio: error: the colour configuration '/' cannot be read: it is a folder"}},
+    {"colour configuration that is none", "relit: 1\n", "relit: 1\ncolor: {config: capture.yaml}\n", .says = {"capture.yaml: error: not a colour configuration"}},
     {"unknown output", .arguments = {"--only", "beuaty"}, .says = {"did you mean 'beauty'?"}},
     {"unknown image to dump", .arguments = {"--dump", "light.difuse"}, .says = {"--dump: error:", "did you mean 'diffuse'?"}},
     {"unknown option", .arguments = {"--frmes", "1"}, .says = {"relit run: error:", "did you mean 'frames'?"}},
     {"unknown path of --set", .arguments = {"--set", "graph.sss.tapps=5"}, .says = {"--set", "did you mean 'taps'?"}},
+    {"unknown node of --set", .arguments = {"--set", "graph.ss.taps=5"}, .says = {"--set graph.ss.taps=5:1:1: error: the graph has no entry 'ss'; did you mean 'sss'?", "a new one needs 'pass'"}},
+    {"unknown output of --set", .arguments = {"--set", "outputs.beuaty.type=float"}, .says = {"there is no output 'beuaty'; did you mean 'beauty'?", "a new one needs"}},
+    {"a light that the capture lacks, removed", "lights:\n  key: {type: point, position: [-0.5, -0.52, 0.47], intensity: 2.2}\n", "", .arguments = {"--set", "lights.rin=null"}, .says = {"--set lights.rin=null:1:1: error:", "did you mean 'rim'?"}},
     /* values */
     {"below the range", "blend: 0.05", "blend: -0.5", .at = "-0.5}", .says = {"blend", "-0.5", "0"}},
     {"above the range", "blend: 0.05", "blend: 1.5", .at = "1.5", .says = {"blend", "1.5", "1"}},
@@ -93,6 +105,7 @@ static const row rows[] = {
     {"frames that are not listed", .arguments = {"--frames", "7-9"}, .says = {"9"}},
     {"frames that are no spec", .arguments = {"--frames", "1..3"}, .says = {"1..3"}},
     {"not YAML", "relit: 1", "relit: [1", .says = {"pipe.yaml:"}},
+    {"a tab", "  light: {pass", "\tlight: {pass", .at = "\tlight", .says = {"not YAML: a tab"}},
     {"key twice", "relit: 1", "relit: 1\nrelit: 1", .at = "relit: 1\ncapture", .says = {"relit"}},
     {"no version", "relit: 1\n", "", .says = {"pipe.yaml:", "relit: 1"}},
     /* structure */
@@ -103,12 +116,14 @@ static const row rows[] = {
     {"include missing", "relit: 1\n", "relit: 1\ninclude: [gone.yaml]\n", .says = {"gone.yaml"}},
     {"two outputs of one file", "frame:04}.png\"", "frame:04}.exr\"", .says = {"pipe.yaml:", "beauty", "view"}},
     /* captures */
-    {"missing manifest", "capture: capture.yaml", "capture: gone.yaml", .says = {"gone.yaml"}},
+    {"missing manifest", "capture: capture.yaml", "capture: gone.yaml", .at = "gone.yaml", .says = {"the capture '", "gone.yaml' cannot be opened: No such file"}},
+    {"missing manifest of --capture", .arguments = {"--capture", "gone.yaml"}, .says = {"gone.yaml: error: cannot be opened: No such file"}},
     {"missing files", "monkey.####.exr", "gone.####.exr", true, .says = {"gone."}},
     {"missing channel", "normal.X, normal.Y", "nrm.X, normal.Y", true, .says = {"monkey.0001.exr", "layer 'normal'", "'nrm.X'", "normal.X"}},
     {"missing required layer", "  depth:     {channels: [depth.Z], kind: planar, empty: 1e10}\n", "", true, .says = {"depth"}},
     {"a material for a name that the capture lacks", "  default: {}", "  default: {}\n  marbel: {}", .at = "marbel", .says = {"marbel"}},
     {"a stencil id without a material", "  default: {}\n", "", .says = {"id 2", "pixels"}, .status = 1},
+    {"a trace that cannot be written", .arguments = {"--trace", "/no/such/folder/t.json"}, .says = {"/no/such/folder/t.json: error: cannot be written: No such file"}},
     {"more memory than allowed", .arguments = {"--memory-limit", "1M"}, .says = {"memory"}},
     {"a crop outside of the image", .arguments = {"--crop", "5000,0,10,10"}, .says = {"--crop 5000"}, .status = 1},
 };
@@ -345,6 +360,38 @@ static void test_zero_bytes(void **state)
     check_broken_frame("zero bytes", damage_empty, "");
 }
 
+/* A link to something without an end, a pipe that nobody writes to: refused, not read for ever. */
+static void check_endless(bool pipe)
+{
+    size_t size;
+    char *data, *folder = two_frames(&data, &size), *out = path_in(folder, "out");
+    char *frame = path_in(folder, "monkey.0002.exr");
+    assert_int_equal(pipe ? mkfifo(frame, 0666) : symlink("/dev/zero", frame), 0);
+    tool_result got = run_in(folder, "1-2", NULL, NULL);
+    bool good = got.status == 1 && error_lines(got.err) == 1 && folder_files(out) == 2 &&
+                strstr(got.err, "monkey.0002.exr: error: cannot be opened: not a regular file");
+    if (!good)
+        print_error("status %d, %d files:\n%s", got.status, folder_files(out), got.err);
+    tool_result_free(&got);
+    free(data);
+    free(out);
+    free(frame);
+    folder_remove(folder);
+    assert_true(good);
+}
+
+static void test_pipe_and_device(void **state)
+{
+    (void)state;
+    check_endless(true);
+    check_endless(false);
+    const char *arguments[] = {"check", "/dev/zero", NULL};
+    tool_result got = tool_run(arguments);
+    assert_int_equal(got.status, 2);
+    assert_non_null(strstr(got.err, "/dev/zero: error: cannot be read: no file, and more than 64 MiB"));
+    tool_result_free(&got);
+}
+
 static void test_missing_frame(void **state)
 {
     (void)state;
@@ -464,6 +511,27 @@ static void test_no_device(void **state)
     check_machine("out", "OCL_ICD_VENDORS=/nonexistent", "no OpenCL device", "PoCL");
 }
 
+/* PoCL has no device where it cannot keep what it compiles. */
+static void test_no_home(void **state)
+{
+    (void)state;
+    char *folder = folder_new(), *before = getenv("TMPDIR") ? strdup(getenv("TMPDIR")) : NULL;
+    setenv("TMPDIR", folder, 1);
+    const char *arguments[] = {"devices", NULL};
+    tool_result got = tool_run_child("XDG_CACHE_HOME=/dev/null/none", arguments);
+    if (before)
+        setenv("TMPDIR", before, 1);
+    else
+        unsetenv("TMPDIR");
+    if (got.status)
+        print_error("%s", got.err);
+    assert_int_equal(got.status, 0);
+    assert_non_null(strstr(got.out, "a run takes this one"));
+    tool_result_free(&got);
+    free(before);
+    folder_remove(folder);
+}
+
 /* Root ignores permissions: a path below a file, and a file system that takes no files. */
 static void test_unwritable_output(void **state)
 {
@@ -492,18 +560,13 @@ int main(int argc, char **argv)
         return 1;
     }
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_base_is_good),
-        cmocka_unit_test(test_rows),
-        cmocka_unit_test(test_truncated),
-        cmocka_unit_test(test_corrupt_header),
-        cmocka_unit_test(test_corrupt_pixels),
-        cmocka_unit_test(test_zero_bytes),
-        cmocka_unit_test(test_missing_frame),
-        cmocka_unit_test(test_huge_dimensions),
-        cmocka_unit_test(test_layers_of_different_size),
-        cmocka_unit_test(test_no_device),
-        cmocka_unit_test(test_unwritable_output),
-        cmocka_unit_test(test_missing_pipeline),
+        cmocka_unit_test(test_base_is_good),      cmocka_unit_test(test_rows),
+        cmocka_unit_test(test_truncated),         cmocka_unit_test(test_corrupt_header),
+        cmocka_unit_test(test_corrupt_pixels),    cmocka_unit_test(test_zero_bytes),
+        cmocka_unit_test(test_missing_frame),     cmocka_unit_test(test_pipe_and_device),
+        cmocka_unit_test(test_huge_dimensions),   cmocka_unit_test(test_layers_of_different_size),
+        cmocka_unit_test(test_no_device),         cmocka_unit_test(test_no_home),
+        cmocka_unit_test(test_unwritable_output), cmocka_unit_test(test_missing_pipeline),
     };
     return cmocka_run_group_tests_name("errors", tests, NULL, NULL);
 }

@@ -179,6 +179,23 @@ static void test_metadata(void **state)
     }
 }
 
+/* TIFF and JPEG know no names of ours. */
+static void test_provenance(void **state)
+{
+    static const rl_image_note notes[] = {{"Software", "relit 1"}, {"relit:pipeline", "skin 0123"}};
+    rl_image_planes p = planes(3);
+    rl_image_options o = {.type = RL_IMAGE_U8, .colorspace = "sRGB / ACES", .notes = notes, .notes_n = 2};
+    static const char *const names[] = {"made.tif", "made.jpg"};
+    char text[128];
+    (void)state;
+    for (size_t i = 0; i < 2; i++) {
+        assert_int_equal(rl_image_file_write(in_folder(names[i]), &p, &o, NULL, NULL, NULL), RL_OK);
+        assert_int_equal(rl_image_file_note(in_folder(names[i]), "ImageDescription", text, sizeof text, NULL),
+                         RL_OK);
+        assert_string_equal(text, "relit:pipeline = skin 0123; relit:colorspace = sRGB / ACES");
+    }
+}
+
 static void test_png_text(void **state)
 {
     static const rl_image_note notes[] = {{"relit:pipeline", "skin 0123"}};
@@ -342,6 +359,7 @@ int main(void)
         cmocka_unit_test(test_rounds_to_nearest),
         cmocka_unit_test(test_same_bytes_with_threads),
         cmocka_unit_test(test_metadata),
+        cmocka_unit_test(test_provenance),
         cmocka_unit_test(test_png_text),
         cmocka_unit_test(test_windows),
         cmocka_unit_test(test_unknown_extension),

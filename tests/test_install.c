@@ -77,11 +77,31 @@ static void library_processes_a_frame_from_memory(void **state)
     assert_string_equal(out, "rgb 96x64 0.8000 0.5000 0.4000");
 }
 
+/* What the headers declare is what the library shows, and nothing else. */
+static void library_shows_its_headers(void **state)
+{
+    (void)state;
+    char command[1024], out[8192];
+    snprintf(
+        command, sizeof command,
+        "cd %s && cat include/relit/graph/relit.h include/relit/graph/base/*.h | sed '/^ \\*/d' | "
+        "grep -o '\\brl_[a-z_]*(' | tr -d '(' | sort -u > declared && "
+        "nm -D --defined-only lib/librelit.so | awk '{print $3}' | sort -u > shown && diff declared shown",
+        prefix);
+    int status = run(command, out, sizeof out);
+    if (status)
+        print_message("%s\n", out);
+    assert_int_equal(status, 0);
+    snprintf(command, sizeof command, "test -s %s/share/doc/relit/LICENSE", prefix);
+    assert_int_equal(run(command, out, sizeof out), 0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(program_runs_from_its_prefix),
         cmocka_unit_test(library_processes_a_frame_from_memory),
+        cmocka_unit_test(library_shows_its_headers),
     };
     return cmocka_run_group_tests(tests, install, uninstall);
 }

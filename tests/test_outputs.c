@@ -139,6 +139,62 @@ static void test_refused(void **state)
     expect_refused("layers: {a: c.color, b: c.color}, file: a.png", "a .png file holds one image");
 }
 
+/* ---- what a session says of colours before it runs ---- */
+
+static void keep(void *ctx, rl_severity severity, rl_where where, const char *text)
+{
+    (void)where;
+    rl_str_printf(ctx, "%s %s\n",
+                  severity == RL_WARNING ? "warning"
+                  : severity == RL_NOTE  ? "note"
+                                         : "-",
+                  text);
+}
+
+static void expect_said(const char *outputs, rl_setting setting, const char *want)
+{
+    const char *before = strstr(capture_pipeline, "outputs:");
+    rl_str p = {0}, said = {0};
+    rl_session *s = NULL;
+    rl_error err = {0};
+    rl_log log = {keep, &said};
+    rl_str_printf(&p, "%.*soutputs: {%s}\ncapture: {files: memory, preset: relit}\nlights: {}\n",
+                  (int)(before - capture_pipeline), capture_pipeline, outputs);
+    rl_options options = {
+        .pipeline_text = p.text, .settings = &setting, .n_settings = !!setting.path, .log = &log};
+    if (rl_session_open(&options, &s, &err))
+        fail_msg("%s", err.text);
+    bool found =
+        *want ? strstr(rl_str_text(&said), want) != NULL
+              : !strstr(rl_str_text(&said), "chromaticities") && !strstr(rl_str_text(&said), "warning");
+    if (!found)
+        fail_msg("\"%s\" is not in \"%s\"", want, rl_str_text(&said));
+    rl_session_close(&s);
+    rl_str_free(&p);
+    rl_str_free(&said);
+}
+
+static void test_said(void **state)
+{
+    static const rl_setting none = {NULL, NULL};
+    (void)state;
+    expect_said("o: {image: c.color, file: a.exr, colorspace: ACEScct}", none,
+                "note output 'o' has no chromaticities: 'ACEScct' is not linear RGB");
+    expect_said("o: {image: c.color, file: a.exr, display: sRGB, view: ACES}", none,
+                "note output 'o' has no chromaticities: 'sRGB / ACES' is not linear");
+    expect_said(
+        "o: {image: c.color, file: a.exr, colorspace: ACEScg}, d: {image: capture.depth, file: d.exr}, "
+        "p: {image: c.color, file: a.png, display: sRGB}",
+        none, "");
+    expect_said("o: {image: c.color, file: a.exr}", (rl_setting){"color.working", "ACEScg"}, "");
+    expect_said("o: {image: c.color, file: a.exr}", (rl_setting){"color.working", "ACEScct"},
+                "warning the working space 'ACEScct' is not linear RGB");
+    expect_said("o: {image: c.color, file: a.exr}", (rl_setting){"color.working", "raw"},
+                "warning the working space 'raw' holds data");
+    expect_said("o: {image: c.color, file: a.exr}", (rl_setting){"profiles.skn.texturing", "post"},
+                "warning no material uses the profile 'skn'");
+}
+
 /* ---- headers ---- */
 
 static void expect_numbers(const rl_exr *f, const char *name, const double *want, int n, double tolerance)
@@ -242,7 +298,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_letters), cmocka_unit_test(test_single_letters), cmocka_unit_test(test_refused),
-        cmocka_unit_test(test_header),  cmocka_unit_test(test_crop),
+        cmocka_unit_test(test_said),    cmocka_unit_test(test_header),         cmocka_unit_test(test_crop),
     };
     return cmocka_run_group_tests(tests, output_setup, output_teardown);
 }

@@ -16,7 +16,8 @@ static rl_code io_error(rl_error *err, const char *path, const char *what)
     return rl_fail_file(err, RL_E_IO, path, "%s: %s", what, strerror(errno));
 }
 
-/* A pipe or a device that has more than this has no end (/dev/zero): far beyond any text that is read whole. */
+/* A pipe or a device that has more than this has no end (/dev/zero): far beyond any text that is read whole.
+ */
 enum { STREAM_BYTES = 64 << 20 };
 
 static rl_code read_all(int fd, const char *path, char **data, size_t *size, rl_error *err)
@@ -40,7 +41,8 @@ static rl_code read_all(int fd, const char *path, char **data, size_t *size, rl_
             break;
         used += (size_t)n;
         if (used > STREAM_BYTES && !S_ISREG(st.st_mode)) {
-            code = rl_fail_file(err, RL_E_IO, path, "cannot be read: no file, and more than %d MiB come out of it",
+            code = rl_fail_file(err, RL_E_IO, path,
+                                "cannot be read: no file, and more than %d MiB come out of it",
                                 STREAM_BYTES >> 20);
             break;
         }
@@ -115,6 +117,24 @@ rl_code rl_file_commit(const char *temp, const char *path, rl_error *err)
 void rl_file_discard(const char *temp)
 {
     unlink(temp);
+}
+
+rl_code rl_file_probe(const char *path, rl_error *err)
+{
+    char temp[4096];
+    if (is_special(path))
+        return RL_OK;
+    if (rl_path_is_folder(path))
+        return rl_fail_file(err, RL_E_IO, path, "cannot be written: it is a folder");
+    rl_code code = rl_file_temp(path, temp, sizeof temp, err);
+    if (code)
+        return code;
+    int fd = open(temp, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+    if (fd < 0)
+        return io_error(err, path, "cannot be written");
+    close(fd);
+    unlink(temp);
+    return RL_OK;
 }
 
 static rl_code write_all(int fd, const char *path, const void *data, size_t size, rl_error *err)

@@ -19,6 +19,9 @@ rl_code rl_file_read(const char *path, char **data, size_t *size, rl_error *err)
  * fsync, rename. A device or a pipe (/dev/stdout) is written to, not replaced. */
 rl_code rl_file_write(const char *path, const void *data, size_t size, rl_error *err);
 
+/* Whether a file could be written under this name: asked before the work whose result it will hold. */
+rl_code rl_file_probe(const char *path, rl_error *err);
+
 /* For writers that need a path of their own: a fresh name beside `path` (in `out`, room for `size` bytes);
  * then either commit (fsync and rename to `path`) or discard (unlink). The temporary's name ends in ".tmp"
  * behind the extension kept by `path`, so that a library that picks a format by name is told it otherwise. */

@@ -77,7 +77,7 @@ typedef struct rl_layer {
 
     const char *colorspace; /* albedo, emission, back_albedo */
     rl_where colorspace_where;
-    rl_space space;         /* normals */
+    rl_space space; /* normals */
     rl_encoding encoding;
     rl_depth_kind kind;   /* depths */
     double near_m, far_m; /* RL_DEPTH_DEVICE; metres, 0 < near < far, far may be infinite */

@@ -53,7 +53,8 @@ static rl_code find_pass(parser *q, const rl_entry *entry, const rl_pass **out)
     const rl_value *v;
     const char *name = NULL;
     if (entry->value->implied && !rl_value_get(entry->value, "pass"))
-        return rl_fail_absent(q->err, rl_value_get(q->p->root, "graph"), entry, "the graph has no entry", "'pass'");
+        return rl_fail_absent(q->err, rl_value_get(q->p->root, "graph"), entry, "the graph has no entry",
+                              "'pass'");
     rl_code code = rl_value_need(entry->value, "pass", "graph entry", entry->key, "the pass that it runs",
                                  entry->where, &v, q->err);
     if (!code)

@@ -47,7 +47,7 @@ typedef struct rl_output {
     const char *display, *view, *look; /* or NULL */
     rl_where color_where;              /* of colorspace or display, else of the output */
     rl_where view_where, look_where;   /* of what is given */
-    double exposure;    /* stops */
+    double exposure;                   /* stops */
     rl_pixel_type type; /* given, or the file type's default: half for EXR, uint8 for PNG and JPEG, … */
     const char *compression; /* EXR: lower case name, default "zip"; TIFF: none|lzw|zip; NULL = the writer's
                                 default */
@@ -65,7 +65,7 @@ typedef struct rl_pipeline {
     const rl_value *capture; /* a path (text) or an inline manifest (map); NULL = must come from --capture */
     const char *ocio_config; /* path resolved against the file that names it, or NULL */
     rl_where ocio_where;
-    const char *working;     /* working colour space, or NULL: the config's scene_linear role */
+    const char *working; /* working colour space, or NULL: the config's scene_linear role */
     rl_where color_where;
     const rl_value *profiles, *shading, *materials; /* maps or NULL, see materials.h */
     const rl_value *lights;  /* map, or NULL: the capture's own; `implied`: changes to those */
@@ -76,8 +76,8 @@ typedef struct rl_pipeline {
     size_t n_outputs;
 } rl_pipeline;
 
-/* --set and --vary: rl_value_set on a pipeline's tree. A path into `lights` where the pipeline lists none is one
- * into the capture's, known later only: `null` stays there, until the two are merged. */
+/* --set and --vary: rl_value_set on a pipeline's tree. A path into `lights` where the pipeline lists none is
+ * one into the capture's, known later only: `null` stays there, until the two are merged. */
 rl_code rl_pipeline_set(rl_arena *arena, rl_value **root, const char *path, rl_value *v, rl_error *err);
 
 /* Parses a merged tree. User kernels (`pass: kernel`) become descriptors in the arena; their .cl file is read

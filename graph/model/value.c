@@ -333,9 +333,11 @@ static rl_code set_path(const setting *s, rl_value **root)
         depth += *p == '.';
     size_t n = strlen(path);
     if (!n || path[0] == '.' || path[n - 1] == '.' || strstr(path, ".."))
-        return rl_fail(s->err, RL_E_USAGE, s->v->where, "'%s' is no dotted path, such as graph.sss.taps", path);
+        return rl_fail(s->err, RL_E_USAGE, s->v->where, "'%s' is no dotted path, such as graph.sss.taps",
+                       path);
     if (depth > DEEPEST)
-        return rl_fail(s->err, RL_E_USAGE, s->v->where, "the path has %d parts; the most is %d", depth, DEEPEST);
+        return rl_fail(s->err, RL_E_USAGE, s->v->where, "the path has %d parts; the most is %d", depth,
+                       DEEPEST);
     return set_at(s, root, path);
 }
 

@@ -90,8 +90,8 @@ rl_code rl_value_keys(const rl_value *v, const char *what, const char *const *kn
 rl_code rl_fail_unknown(rl_error *err, rl_where where, const char *head, const char *name,
                         const char *const *known, size_t n);
 
-/* A path of --set into an entry of `all` that nobody wrote: "<head> 'name'; did you mean …? known: … (a new one
- * needs <needs>)". */
+/* A path of --set into an entry of `all` that nobody wrote: "<head> 'name'; did you mean …? known: … (a new
+ * one needs <needs>)". */
 rl_code rl_fail_absent(rl_error *err, const rl_value *all, const rl_entry *e, const char *head,
                        const char *needs);
 

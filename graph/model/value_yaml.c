@@ -98,6 +98,16 @@ static rl_code read_scalar(reader *r, const yaml_event_t *event, rl_value *v)
     return RL_OK;
 }
 
+/* Whether the parser gave up at a tab: "found character that cannot start any token" tells nobody. */
+static bool at_tab(const reader *r)
+{
+    size_t characters = r->parser.problem_mark.index;
+    for (size_t i = 0; i < r->text_size; i++)
+        if (((unsigned char)r->text[i] & 0xC0) != 0x80 && characters-- == 0)
+            return r->text[i] == '\t';
+    return false;
+}
+
 static rl_code next_event(reader *r, yaml_event_t *event)
 {
     yaml_parser_t *p = &r->parser;
@@ -115,6 +125,8 @@ static rl_code next_event(reader *r, yaml_event_t *event)
             where.line += r->text[i] == '\n';
         }
     }
+    if (p->error == YAML_SCANNER_ERROR && at_tab(r))
+        return rl_fail(r->err, RL_E_CONFIG, where, "not YAML: a tab, where only spaces may indent");
     return rl_fail(r->err, RL_E_CONFIG, where, "not YAML: %s%s%s", p->context ? p->context : "",
                    p->context ? ": " : "", p->problem ? p->problem : "unreadable");
 }

@@ -12,7 +12,8 @@
 /* Room for a path; those that do not fit count as not usable. */
 enum { ROOM = 2048 };
 
-/* Whether a folder can be written to, or made: by the nearest of its parents that is there. Changes `path`. */
+/* Whether a folder can be written to, or made: by the nearest of its parents that is there. Changes `path`.
+ */
 static bool usable(char *path)
 {
     char *slash = NULL;

@@ -65,7 +65,8 @@ static rl_code look_at(const char *path, rl_error *err)
     return S_ISDIR(st.st_mode) ? rl_fail_file(err, RL_E_IO, path, "cannot be read: it is a folder") : RL_OK;
 }
 
-/* What OpenColorIO says without what its message begins with: "Error: Loading the OCIO profile 'PATH' failed." */
+/* What OpenColorIO says without what its message begins with: "Error: Loading the OCIO profile 'PATH'
+ * failed." */
 static const char *reason(const char *message)
 {
     static const char failed[] = "' failed. ";

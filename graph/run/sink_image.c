@@ -62,7 +62,8 @@ rl_code rl_sink_write_image(const char *path, const rl_sink_output *output, cons
         planes.plane[i] = image->pixels + (size_t)i * image->plane + first;
     rl_image_note notes[] = {{"Software", "relit " RL_VERSION}, {"relit:pipeline", frame->pipeline}};
     rl_image_options options = {.type = image_type(output->spec->type),
-                                .colorspace = output->space,
+                                .colorspace =
+                                    image->format == RL_RGB ? output->space : NULL, /* data has none */
                                 .quality = output->spec->quality > 0 ? (int)output->spec->quality : 0,
                                 .compression = output->spec->level,
                                 .notes = notes,

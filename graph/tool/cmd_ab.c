@@ -116,6 +116,8 @@ static rl_code open_all(rl_ab_run *r, rl_error *err)
         code = rl_ab_measure_new(&r->plan, r->experiment, r->pool, &tool->report->log, &r->measure, err);
     if (!code)
         code = rl_outdir_make(r->out, err);
+    if (!code && tool->args.trace)
+        code = rl_file_probe(tool->args.trace, err);
     if (!code)
         code = open_sheet(r, err);
     return code ? code : open_page(r, err);

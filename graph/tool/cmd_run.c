@@ -1,4 +1,5 @@
 /* `relit run`: written on graph/relit.h, as any other user of the library would be. */
+#include "graph/base/file.h"
 #include "graph/tool/outdir.h"
 #include "graph/tool/signals.h"
 #include "graph/tool/tool.h"
@@ -55,7 +56,7 @@ int rl_cmd_run(rl_tool *tool, rl_error *err)
         goto done;
     hooks.span = sinks.trace ? on_span : NULL;
     if (rl_session_open(&tool->args.run, &session, err) || rl_session_prepare(session, err) ||
-        rl_outdir_make(tool->args.run.out, err))
+        rl_outdir_make(tool->args.run.out, err) || (tool->args.trace && rl_file_probe(tool->args.trace, err)))
         goto done;
     rl_signals_begin(fileno(tool->report->err));
     rl_report_run_begin(tool->report);

@@ -252,6 +252,8 @@ static rl_code parse_operand(const parser *p, const char *word)
                             word, p->command->name);
     if (!p->command->operand)
         return rl_fail_file(p->err, RL_E_USAGE, p->place, "takes no argument, found '%s'", word);
+    if (!word[0])
+        return rl_fail_file(p->err, RL_E_USAGE, p->place, "takes %s, found ''", p->command->operand);
     if (takes_several(p->command))
         return add_operand(p, word);
     bool two = strchr(p->command->operand, ' ');
