@@ -61,6 +61,7 @@ static const row rows[] = {
     {"ies file without a name", "intensity: 2.2", "direction: [0, 0, -1], ies: ''", .at = "''}", .says = {"the ies file '", "cannot be"}},
     {"no such hdri", NULL, "ambient: {hdri: no.hdr, up: z}\n", .at = "no.hdr", .says = {"the hdri '", "no.hdr' cannot be read: No such file"}},
     {"hdri that is no picture", NULL, "ambient: {hdri: capture.yaml, up: z}\n", .at = "capture.yaml, up", .says = {"the hdri '", "is not an image"}},
+    {"hdri without an end", NULL, "ambient: {hdri: /dev/zero, up: z}\n", .at = "/dev/zero", .says = {"'/dev/zero' cannot be read: not a regular file"}},
     {"ambient light too bright for floats", NULL, "ambient: {sh: [3e38, 0, 0, 0, 0, 0, 0, 0, 0], intensity: 100}\n", .at = "{sh:", .says = {"ambient light is too bright", "1e+30"}},
     /* names */
     {"unknown key", "materials:", "materails:", .at = "materails", .says = {"'materails'", "did you mean 'materials'?"}},
@@ -413,17 +414,16 @@ static char *damage_size(char *data, size_t *size)
     return data;
 }
 
-static void test_huge_dimensions(void **state)
+/* With a limit, and as what no device could hold. */
+static void check_huge(const char *const *limit, const char *says)
 {
-    (void)state;
-    static const char *const limit[] = {"--memory-limit", "1G", NULL, NULL, NULL};
     size_t size;
     char *data, *folder = two_frames(&data, &size), *out = path_in(folder, "out");
     data = damage_size(data, &size);
     file_write(folder, "monkey.0002.exr", data, size);
     tool_result got = run_in(folder, "1-2", limit, NULL);
     bool good = got.status == 1 && error_lines(got.err) == 1 && folder_files(out) == 2 &&
-                strstr(got.err, "monkey.0002.exr: error: ");
+                strstr(got.err, "monkey.0002.exr: error: ") && strstr(got.err, says);
     if (!good)
         print_error("status %d, %d files:\n%s", got.status, folder_files(out), got.err);
     tool_result_free(&got);
@@ -431,6 +431,14 @@ static void test_huge_dimensions(void **state)
     free(out);
     folder_remove(folder);
     assert_true(good);
+}
+
+static void test_huge_dimensions(void **state)
+{
+    (void)state;
+    static const char *const limit[] = {"--memory-limit", "1G", NULL, NULL, NULL};
+    check_huge(limit, "the limit is 1.0 GiB");
+    check_huge(NULL, "a data window of 40000 x 40000 at (0, 0) is too large");
 }
 
 /* ---- layers of different size ----------------------------------------------------------------------------

@@ -251,19 +251,25 @@ static void test_header(void **state)
 
 static void test_crop(void **state)
 {
-    static const int crop[4] = {-20, 8, 40, 12}, beside[4] = {41, 5, 10, 10};
+    static const int crop[4] = {-20, 8, 40, 12}, beside[4] = {41, 5, 10, 10},
+                     rest[4] = {30, 8, 2147483647, 2147483647}; /* its end is beyond an int */
     (void)state;
     const char *outputs =
         "\n  e: {image: c.color, file: e.exr, type: float}\n  p: {image: c.color, file: p.png, display: sRGB}"
         "\n  s: {image: capture.stencil, file: s.exr}";
     rl_run_summary summary;
     char *whole = output_run(outputs, NULL, NULL), *part = output_run(outputs, crop, NULL),
-         *none = output_run(outputs, beside, &summary);
+         *most = output_run(outputs, rest, NULL), *none = output_run(outputs, beside, &summary);
     rl_exr *a = output_open(whole, "e.exr"), *b = output_open(part, "e.exr"), *s = output_open(part, "s.exr");
     const rl_exr_part *p = rl_exr_part_at(b, 0);
     assert_true(p->data_window.x0 == -9 && p->data_window.y0 == 8 && p->data_window.x1 == 19 &&
                 p->data_window.y1 == 19);
     assert_true(p->display_window.x0 == 0 && p->display_window.x1 == 71);
+    rl_exr *end = output_open(most, "e.exr");
+    const rl_exr_box *box = &rl_exr_part_at(end, 0)->data_window;
+    assert_true(box->x0 == 30 && box->y0 == 8 && box->x1 == 40 && box->y1 == 34);
+    rl_exr_close(&end);
+    folder_remove(most);
     float *x = output_floats(a, "G"), *y = output_floats(b, "G"), *cover = output_floats(b, "A");
     uint32_t id[29 * 12];
     rl_exr_plane plane = {.channel = "ID", .ids = id, .stride = 29};

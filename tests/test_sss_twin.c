@@ -61,6 +61,7 @@ static void burley_equals_twin_4096(void **state)
 static void reference_equals_twin(void **state)
 {
     (void)state;
+    double most = 0;
     for (int variant = 0; variant < 6; variant++)
         for (size_t k = 0; k < sizeof windows / sizeof *windows; k++) {
             sss_scene s = sss_scene_make(windows[k].x, windows[k].y, windows[k].width, windows[k].height,
@@ -74,8 +75,10 @@ static void reference_equals_twin(void **state)
             if (worst > 2e-5)
                 print_message("reference, window %zu, variant %d: %.2e\n", k, variant, worst);
             assert_true(worst <= 1e-4);
+            most = worst > most ? worst : most;
             sss_scene_free(&s);
         }
+    print_message("sss_reference against a sum in double: %.2e\n", most);
 }
 
 /* From pixels much larger than d to much smaller: the numerical integral near the centre holds. */

@@ -5,6 +5,8 @@
 #include <stdio.h>
 #include <string.h>
 #include <strings.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include "graph/base/alloc.h"
 #include "graph/base/file.h"
@@ -271,10 +273,11 @@ static rl_code open_file(const char *path, const rl_oiio_module **module, rl_oii
     *module = rl_image_module(err);
     if (!*module)
         return RL_E_IO;
-    FILE *f = fopen(path, "rb"); /* the system's own reason first */
-    if (!f)
+    struct stat st; /* the system's own reason first */
+    if (stat(path, &st) || access(path, R_OK))
         return rl_fail_file(err, RL_E_IO, path, "cannot be read: %s", strerror(errno));
-    fclose(f);
+    if (!S_ISREG(st.st_mode)) /* a pipe or a device may have no end */
+        return rl_fail_file(err, RL_E_IO, path, "cannot be read: not a regular file");
     if ((*module)->open(path, file, info, message, sizeof message))
         return rl_fail_file(err, RL_E_FORMAT, path, "is not an image that can be read: %s", message);
     return RL_OK;

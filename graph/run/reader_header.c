@@ -176,9 +176,10 @@ rl_code rl_reader_open(rl_reader *r, int file_number, rl_frame *f, rl_error *err
     f->data_window = part->data_window;
     f->display_window = part->display_window;
     code = check_layers(r, f, err);
-    if (!code)
-        code = rl_geometry_make(f->data_window.x0, f->data_window.y0, part->width, part->height, &f->geometry,
-                                err);
+    rl_error why = {0};
+    if (!code &&
+        rl_geometry_make(f->data_window.x0, f->data_window.y0, part->width, part->height, &f->geometry, &why))
+        code = rl_fail_file(err, why.code, rl_exr_path(f->files[f->main_file]), "%s", why.text);
     if (!code)
         code = read_camera(r, f, file_number, err);
     return code;

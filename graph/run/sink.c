@@ -53,8 +53,9 @@ static rl_code crop_region(const rl_sink_frame *f, region *r, rl_error *err)
         const int *c = f->crop;
         w.x0 = c[0] > d.x0 ? c[0] : d.x0;
         w.y0 = c[1] > d.y0 ? c[1] : d.y0;
-        w.x1 = c[0] + c[2] - 1 < d.x1 ? c[0] + c[2] - 1 : d.x1;
-        w.y1 = c[1] + c[3] - 1 < d.y1 ? c[1] + c[3] - 1 : d.y1;
+        long long x1 = (long long)c[0] + c[2] - 1, y1 = (long long)c[1] + c[3] - 1;
+        w.x1 = x1 < d.x1 ? (int)x1 : d.x1;
+        w.y1 = y1 < d.y1 ? (int)y1 : d.y1;
         if (w.x1 < w.x0 || w.y1 < w.y0)
             return rl_fail(err, RL_E_DATA, RL_NOWHERE,
                            "--crop %d,%d,%d,%d lies outside of the data window (%d, %d) - (%d, %d)", c[0],
