@@ -203,7 +203,8 @@ rl_code rl_session_process(rl_session *session, size_t capture, long long frame,
 /* Forgets history. */
 void rl_session_cut(rl_session *session);
 
-/* An image that the session's outputs (or `dump`) ask for, of the last processed frame: "light.diffuse".
+/* An image of the last processed frame that the session's outputs (or `dump`) ask for: "light.diffuse". An
+ * output with a colour transform asks for the transformed one, "output.NAME.out" ("output.NAME.LAYER.out").
  * Planes R, G, B and such; ids, as the capture has them, are given as floats' bits (format "id"). Valid until
  * the next call that processes or closes. */
 typedef struct rl_image_view {

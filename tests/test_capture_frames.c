@@ -54,6 +54,46 @@ static void test_a_camera_a_frame(void **state)
     }
 }
 
+/* ---- images, by name ---- */
+
+static void expect_no_image(rl_session *s, const char *name, const char *text)
+{
+    rl_image_view v;
+    rl_error err = {0};
+    assert_int_equal(rl_session_image(s, name, &v, &err), RL_E_USAGE);
+    if (!strstr(err.text, text))
+        fail_msg("\"%s\" is not in \"%s\"", text, err.text);
+    assert_null(v.plane[0]);
+}
+
+static void test_images(void **state)
+{
+    static const capture_form form = {.name = "header", .compression = RL_EXR_ZIP};
+    (void)state;
+    scene truth[1];
+    rl_session *s = NULL;
+    rl_image_view v;
+    rl_error err = {0};
+    char *folder = sequence_make(&form, truth, 1);
+    char *shown = text_replace(capture_pipeline, "type: float}", "display: sRGB, view: ACES}");
+    const char *const captures[] = {folder};
+    rl_options options = {.pipeline_text = shown, .captures = captures, .n_captures = 1};
+    assert_int_equal(rl_session_open(&options, &s, &err), RL_OK);
+    expect_no_image(s, "c.color", "no frame was processed");
+    assert_int_equal(rl_session_process(s, 0, 1, NULL, &err), RL_OK);
+    expect_no_image(s, "c.color", "'c.color' is not kept: name it in options.dump");
+    expect_no_image(s, "c.colour", "there is no image 'c.colour'; did you mean 'c.color'?");
+    assert_int_equal(rl_session_image(s, "output.o.out", &v, &err), RL_OK); /* as the display shows it */
+    float most = 0;
+    for (int y = 0; y < v.height; y++)
+        for (int x = 0; x < v.width; x++)
+            most = fmaxf(most, v.plane[0][(size_t)y * v.stride + (size_t)x]);
+    assert_true(most > 0.1f && most <= 1.0001f);
+    rl_session_close(&s);
+    free(shown);
+    sequence_leave(folder, truth, 1);
+}
+
 static void expect_wrong(const rl_options *options, const char *text)
 {
     rl_session *s = NULL;
@@ -310,13 +350,10 @@ static void test_two_captures(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_a_camera_a_frame),
-        cmocka_unit_test(test_frames_option),
-        cmocka_unit_test(test_numbers),
-        cmocka_unit_test(test_missing),
-        cmocka_unit_test(test_cuts),
-        cmocka_unit_test(test_command_line),
-        cmocka_unit_test(test_two_captures),
+        cmocka_unit_test(test_a_camera_a_frame), cmocka_unit_test(test_images),
+        cmocka_unit_test(test_frames_option),    cmocka_unit_test(test_numbers),
+        cmocka_unit_test(test_missing),          cmocka_unit_test(test_cuts),
+        cmocka_unit_test(test_command_line),     cmocka_unit_test(test_two_captures),
     };
     return cmocka_run_group_tests(tests, setup, teardown);
 }

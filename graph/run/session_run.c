@@ -262,6 +262,25 @@ static rl_code keep_view(rl_session *s, rl_memory *memory, rl_error *err)
     return RL_OK;
 }
 
+static rl_code not_kept(const rl_graph *graph, const char *image, rl_error *err)
+{
+    rl_str near = {0};
+    const char **names = rl_calloc(graph->n_images + 1, sizeof *names);
+    for (size_t i = 0; names && i < graph->n_images; i++)
+        names[i] = graph->images[i].name;
+    if (names && rl_graph_find(graph, image) < 0)
+        rl_suggest(&near, image, names, graph->n_images, "known");
+    rl_code code = near.text
+                       ? rl_fail(err, RL_E_USAGE, RL_NOWHERE, "there is no image '%s'%s", image, near.text)
+                       : rl_fail(err, RL_E_USAGE, RL_NOWHERE,
+                                 "image '%s' is not kept: name it in options.dump, or in an output without a "
+                                 "colour transform",
+                                 image);
+    rl_str_free(&near);
+    rl_free(names);
+    return code;
+}
+
 rl_code rl_session_image(rl_session *s, const char *image, rl_image_view *out, rl_error *err)
 {
     *out = (rl_image_view){0};
@@ -270,10 +289,7 @@ rl_code rl_session_image(rl_session *s, const char *image, rl_image_view *out, r
     const rl_sequence *q = s->frame_sequence;
     int buffer = find_kept(q, image);
     if (buffer < 0)
-        return rl_fail(
-            err, RL_E_USAGE, RL_NOWHERE,
-            "image '%s' is not kept: name it in options.dump, or in an output without a colour transform",
-            image);
+        return not_kept(q->graph, image, err);
     rl_sink_image view = {0};
     rl_memory *memory;
     rl_code code = rl_session_map_image(q, &s->frame, buffer, &view, &memory, err);
