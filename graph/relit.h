@@ -128,7 +128,7 @@ typedef struct rl_frame_result {
     size_t n_files;        /* written */
     const char *const *files;
     uint64_t nonfinite, clamped; /* samples of the capture that were NaN or infinite (now 0), or clamped */
-    uint64_t clipped;            /* samples of the outputs beyond what their files can hold */
+    uint64_t clipped;            /* samples of outputs without `display` that their files cannot hold */
     double load_s, run_s,
         write_s;        /* seconds in each stage; < 0: not known of this frame alone, nor the counts */
     size_t done, total; /* frames of the whole run, this one included */

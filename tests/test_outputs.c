@@ -247,6 +247,25 @@ static void test_header(void **state)
     folder_remove(out);
 }
 
+/* ---- what does not fit ---- */
+
+static uint64_t clipped(const char *outputs)
+{
+    rl_run_summary summary;
+    folder_remove(output_run(outputs, NULL, &summary));
+    return summary.clipped;
+}
+
+static void test_clipped(void **state)
+{
+    (void)state;
+    assert_int_equal(clipped("\n  o: {image: c.color, file: o.exr, type: float, exposure: 20}"), 0);
+    assert_true(clipped("\n  o: {image: c.color, file: o.exr, exposure: 20}") > 100); /* beyond 65504 */
+    assert_true(clipped("\n  o: {image: capture.normal, file: o.png}") > 100);        /* below 0 */
+    /* what a display cannot show is no loss */
+    assert_int_equal(clipped("\n  o: {image: c.color, file: o.png, exposure: 20, display: sRGB}"), 0);
+}
+
 /* ---- regions ---- */
 
 static void test_crop(void **state)
@@ -304,7 +323,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_letters), cmocka_unit_test(test_single_letters), cmocka_unit_test(test_refused),
-        cmocka_unit_test(test_said),    cmocka_unit_test(test_header),         cmocka_unit_test(test_crop),
+        cmocka_unit_test(test_said),    cmocka_unit_test(test_header),         cmocka_unit_test(test_clipped),
+        cmocka_unit_test(test_crop),
     };
     return cmocka_run_group_tests(tests, output_setup, output_teardown);
 }

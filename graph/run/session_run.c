@@ -139,9 +139,11 @@ static rl_code write_output(rl_session *s, rl_sequence *q, rl_frame *f, size_t o
         if (!code)
             restore_ids(f, w->layers[i].image, &wr.images[i]);
     }
+    uint64_t beyond = 0;
     if (!code)
-        code = rl_sink_write(path, &s->outputs[output], wr.images, w->n_layers, frame, s->pool, &f->clipped,
-                             err);
+        code = rl_sink_write(path, &s->outputs[output], wr.images, w->n_layers, frame, s->pool, &beyond, err);
+    if (!s->outputs[output].spec->display) /* a display cannot show all colours: that is what a view is for */
+        f->clipped += beyond;
     for (size_t i = 0; i < w->n_layers; i++) {
         rl_code unmapped = wr.memory[i] ? rl_memory_unmap(wr.memory[i], code ? NULL : err) : RL_OK;
         code = code ? code : unmapped;

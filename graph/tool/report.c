@@ -146,10 +146,10 @@ static void frame_json(rl_reporter *r, const rl_frame_result *f)
         json_pack("{s:o, s:I, s:b, s:o, s:o}", "capture", json_text(f->capture), "frame",
                   (json_int_t)f->frame, "ok", !(f->error && f->error->code), "files", files, "error", error);
     if (f->load_s >= 0) /* one pipeline's frame */
-        json_object_update_new(object,
-                               json_pack("{s:I, s:I, s:f, s:f, s:f}", "nonfinite", (json_int_t)f->nonfinite,
-                                         "clamped", (json_int_t)f->clamped, "load_s", f->load_s, "run_s",
-                                         f->run_s, "write_s", f->write_s));
+        json_object_update_new(object, json_pack("{s:I, s:I, s:I, s:f, s:f, s:f}", "nonfinite",
+                                                 (json_int_t)f->nonfinite, "clamped", (json_int_t)f->clamped,
+                                                 "clipped", (json_int_t)f->clipped, "load_s", f->load_s,
+                                                 "run_s", f->run_s, "write_s", f->write_s));
     json_object_update_new(
         object, json_pack("{s:I, s:I}", "done", (json_int_t)f->done, "total", (json_int_t)f->total));
     char *text = object ? json_dumps(object, JSON_COMPACT | JSON_REAL_PRECISION(6)) : NULL;
@@ -265,6 +265,10 @@ void rl_report_run_end(rl_reporter *r, const rl_run_summary *s, bool stopped)
     if (s->clamped)
         rl_report(&r->log, RL_NOTE, RL_NOWHERE,
                   "%" PRIu64
-                  " samples were outside of the range of their layer or of their file and were clamped",
+                  " samples of the capture were outside of the range of their layer and were clamped",
                   s->clamped);
+    if (s->clipped)
+        rl_report(&r->log, RL_NOTE, RL_NOWHERE,
+                  "%" PRIu64 " samples of the outputs were beyond what their files can hold and were clamped",
+                  s->clipped);
 }
