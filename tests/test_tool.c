@@ -150,6 +150,7 @@ static void test_usage(void **state)
         {{"run", "p", "--shard", "0/3"}, "I from 1 to N"},
         {{"run", "p", "--shard", "4/3"}, "I from 1 to N"},
         {{"run", "p", "--shard", "3"}, "I from 1 to N"},
+        {{"run", "p", "--shard", "1/1000001"}, "I from 1 to N"},
         {{"run", "p", "--preroll", "4"}, "give --shard I/N too"},
         {{"ab"}, "needs a PIPELINE, see"},
         {{"ab", "p", "--sheet="}, "option '--sheet' takes [=FILE], found ''"},
@@ -158,6 +159,7 @@ static void test_usage(void **state)
         {{"run", "p", "--pairs"}, "it is for ab"},
         {{"bench", "--size", "1920"}, "WxH in pixels"},
         {{"bench", "--size", "0x10"}, "WxH in pixels"},
+        {{"bench", "--size", "10x65537"}, "WxH in pixels"},
         {{"inspect", "p", "--resume"}, "it is for run, check, plan"},
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
