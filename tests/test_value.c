@@ -240,9 +240,10 @@ static void test_bad_yaml(void **state)
     refuse("a: 1\nb: x\xFFy\n", "t.yaml:2:5: error: not YAML: invalid leading UTF-8 octet");
     refuse("a: [1, 2\nb: 3\n", "t.yaml:2:2: error: not YAML: while parsing a flow sequence: did not find "
                                "expected ',' or ']'");
-    refuse("a:\n\t- 1\n",
-           "t.yaml:2:1: error: not YAML: while scanning for the next token: found character that "
-           "cannot start any token");
+    refuse("a:\n\t- 1\n", "t.yaml:2:1: error: not YAML: a tab, where only spaces may indent");
+    refuse("\xC3\xA4: 1\nb:\n\t- 1\n", "t.yaml:3:1: error: not YAML: a tab, where only spaces may indent");
+    refuse("a: @b\n", "t.yaml:1:4: error: not YAML: while scanning for the next token: found character that "
+                      "cannot start any token");
     rl_str deep = {0};
     for (int i = 0; i < 500; i++)
         rl_str_add(&deep, "[");
