@@ -125,8 +125,8 @@ $(BUILD)/graph/tool/metric_filter.o $(BUILD)/graph/tool/metric_flip.o: OPT += -O
 $(BUILD)/graph/tool/metric_flip_rows.o: OPT += -O3 -fno-math-errno -fno-trapping-math
 
 # Where `make install` puts things that are looked for at run time; a build tree finds its own first.
-$(BUILD)/graph/run/image_module.o: CPPFLAGS += -DRL_MODULE_DIR='"$(PREFIX)/lib/relit"'
-$(BUILD)/graph/run/data_files.o: CPPFLAGS += -DRELIT_DATADIR='"$(PREFIX)/share/relit/configs"'
+PLACES = -DRL_MODULE_DIR='"$(PREFIX)/lib/relit"' -DRELIT_DATADIR='"$(PREFIX)/share/relit/configs"'
+$(BUILD)/graph/run/image_module.o $(BUILD)/graph/run/data_files.o: CPPFLAGS += $(PLACES)
 
 .SECONDARY:
 -include $(shell find $(BUILD) -name '*.d' 2>/dev/null)
@@ -231,6 +231,10 @@ install: all
 	  $(DESTDIR)$(PREFIX)/include/relit/graph/base $(DESTDIR)$(PREFIX)/share/relit/kernels $(DESTDIR)$(PREFIX)/share/doc/relit
 	install -m 755 $(BUILD)/relit $(DESTDIR)$(PREFIX)/bin/
 	install -m 644 $(BUILD)/librelit.a $(BUILD)/librelit.so $(DESTDIR)$(PREFIX)/lib/
+	@# Program and shared library find the rest from where they are; linked statically that is anywhere.
+	@for f in image_module data_files; do \
+	  $(CC) $(CPPFLAGS) $(CFLAGS) $(PLACES) -c graph/run/$$f.c -o $(BUILD)/$$f.o && \
+	  ar r $(DESTDIR)$(PREFIX)/lib/librelit.a $(BUILD)/$$f.o && rm $(BUILD)/$$f.o || exit 1; done
 	install -m 644 $(BUILD)/relit_oiio.so $(DESTDIR)$(PREFIX)/lib/relit/
 	install -m 644 graph/relit.h $(DESTDIR)$(PREFIX)/include/relit/graph/
 	install -m 644 graph/base/error.h graph/base/log.h $(DESTDIR)$(PREFIX)/include/relit/graph/base/

@@ -77,6 +77,27 @@ static void library_processes_a_frame_from_memory(void **state)
     assert_string_equal(out, "rgb 96x64 0.8000 0.5000 0.4000");
 }
 
+/* Linked into a program that stands anywhere, it finds the colour configuration of its prefix. */
+static void static_library_finds_its_files(void **state)
+{
+    (void)state;
+    const char *extra = strstr(BUILD_FOLDER, "asan") ? "-fsanitize=address,undefined" : "";
+    char command[2048], out[4096];
+    snprintf(command, sizeof command,
+             "export PKG_CONFIG_PATH=%s/lib/pkgconfig; cc -std=c11 %s tests/example.c -o %s.example "
+             "$(pkg-config --cflags relit) %s/lib/librelit.a "
+             "$(pkg-config --static --libs relit | sed 's/-lrelit //') 2>&1",
+             prefix, extra, prefix, prefix);
+    int status = run(command, out, sizeof out);
+    if (status)
+        print_message("%s\n", out);
+    assert_int_equal(status, 0);
+    snprintf(command, sizeof command, "cd / && %s.example 2>&1; status=$?; rm %s.example; exit $status",
+             prefix, prefix);
+    assert_int_equal(run(command, out, sizeof out), 0);
+    assert_string_equal(out, "rgb 96x64 0.8000 0.5000 0.4000");
+}
+
 /* What the headers declare is what the library shows, and nothing else. */
 static void library_shows_its_headers(void **state)
 {
@@ -101,6 +122,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(program_runs_from_its_prefix),
         cmocka_unit_test(library_processes_a_frame_from_memory),
+        cmocka_unit_test(static_library_finds_its_files),
         cmocka_unit_test(library_shows_its_headers),
     };
     return cmocka_run_group_tests(tests, install, uninstall);
