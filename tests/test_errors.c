@@ -488,6 +488,44 @@ static void test_layers_of_different_size(void **state)
     assert_true(good);
 }
 
+/* ---- colour configurations --------------------------------------------------------------------------------
+ */
+
+/* relit's own with one thing changed: what is broken in it shows where it is used. */
+static void check_config(const char *find, const char *put, const char *set, const char *says)
+{
+    size_t size;
+    char *folder = folder_new(), *manifest = base_manifest(), *path = path_in(folder, "changed.ocio");
+    char *own = file_read("configs/color/relit.ocio", &size), *changed = text_replace(own, find, put);
+    const char *const more[] = {"--ocio", path, "--set", set, NULL};
+    file_write(folder, "pipe.yaml", base_pipeline, strlen(base_pipeline));
+    file_write(folder, "capture.yaml", manifest, strlen(manifest));
+    file_write(folder, "changed.ocio", changed, strlen(changed));
+    tool_result got = run_in(folder, "1", more, NULL);
+    bool good = got.status == 2 && error_lines(got.err) == 1 && strstr(got.err, says);
+    if (!good)
+        print_error("status %d, expected \"%s\":\n%s", got.status, says, got.err);
+    tool_result_free(&got);
+    free(manifest);
+    free(path);
+    free(own);
+    free(changed);
+    folder_remove(folder);
+    assert_true(good);
+}
+
+static void test_broken_config(void **state)
+{
+    (void)state;
+    check_config("{name: Raw, colorspace: raw}", "{name: Raw, colorspace: gone}", "outputs.view.view=Raw",
+                 "pipe.yaml:16:70: error: output 'view': OpenColorIO: ");
+    check_config("to_scene_reference: !<BuiltinTransform> {style: ACEScct_to_ACES2065-1}",
+                 "to_scene_reference: !<FileTransform> {src: gone.spi1d}",
+                 "outputs.beauty.colorspace=ACEScct",
+                 "--set outputs.beauty.colorspace=ACEScct:1:1: error: output 'beauty': OpenColorIO: ");
+    check_config("name: lin_rec709", "name: other", "graph.aa.blend=0.5", "'lin_rec709'");
+}
+
 /* ---- the machine -----------------------------------------------------------------------------------------
  */
 
@@ -568,13 +606,14 @@ int main(int argc, char **argv)
         return 1;
     }
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_base_is_good),      cmocka_unit_test(test_rows),
-        cmocka_unit_test(test_truncated),         cmocka_unit_test(test_corrupt_header),
-        cmocka_unit_test(test_corrupt_pixels),    cmocka_unit_test(test_zero_bytes),
-        cmocka_unit_test(test_missing_frame),     cmocka_unit_test(test_pipe_and_device),
-        cmocka_unit_test(test_huge_dimensions),   cmocka_unit_test(test_layers_of_different_size),
-        cmocka_unit_test(test_no_device),         cmocka_unit_test(test_no_home),
-        cmocka_unit_test(test_unwritable_output), cmocka_unit_test(test_missing_pipeline),
+        cmocka_unit_test(test_base_is_good),     cmocka_unit_test(test_rows),
+        cmocka_unit_test(test_truncated),        cmocka_unit_test(test_corrupt_header),
+        cmocka_unit_test(test_corrupt_pixels),   cmocka_unit_test(test_zero_bytes),
+        cmocka_unit_test(test_missing_frame),    cmocka_unit_test(test_pipe_and_device),
+        cmocka_unit_test(test_huge_dimensions),  cmocka_unit_test(test_layers_of_different_size),
+        cmocka_unit_test(test_broken_config),    cmocka_unit_test(test_no_device),
+        cmocka_unit_test(test_no_home),          cmocka_unit_test(test_unwritable_output),
+        cmocka_unit_test(test_missing_pipeline),
     };
     return cmocka_run_group_tests_name("errors", tests, NULL, NULL);
 }

@@ -26,6 +26,8 @@ static rl_code unknown(const rl_ocio *ocio, rl_ocio_list list, const char *of, c
     rl_suggest(&text, name, names.names, names.n, "known");
     if (!names.n)
         rl_str_add(&text, ": it has none");
+    if (!strcmp(name, "lin_rec709"))
+        rl_str_add(&text, " (lights and albedo are in lin_rec709 unless their 'colorspace' says otherwise)");
     code = rl_fail(err, RL_E_CONFIG, where, "%s", rl_str_text(&text));
 done:
     rl_str_free(&text);

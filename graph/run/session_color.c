@@ -39,6 +39,41 @@ static rl_code open_config(rl_session *s, rl_error *err)
     return code;
 }
 
+/* OpenColorIO names no place: a view or a table of the configuration that is broken shows where it is used.
+ */
+static rl_code at_output(const rl_output *spec, const rl_error *why, rl_error *err)
+{
+    if (!why->file[0] && why->code == RL_E_COLOR)
+        return rl_fail(err, why->code, spec->color_where, "output '%s': %s", spec->name, why->text);
+    if (err)
+        *err = *why;
+    return why->code;
+}
+
+/* The display and the view, by default the display's first. */
+static rl_code choose_view(rl_session *s, const rl_output *spec, rl_ocio_request *request, const char **space,
+                           rl_error *err)
+{
+    const char *view = spec->view;
+    rl_ocio_names views = {0};
+    rl_code code = rl_color_view(s->ocio, spec->display, NULL, NULL, spec->color_where, err);
+    if (!code && !view)
+        code = rl_ocio_list_names(s->ocio, RL_OCIO_VIEWS, spec->display, &s->arena, &views, err);
+    if (views.n > 0) /* OpenColorIO lists the default first */
+        view = views.names[0];
+    if (!code && !view)
+        code = rl_fail(err, RL_E_CONFIG, spec->color_where,
+                       "display '%s' of the colour configuration has no view", spec->display);
+    if (!code)
+        code = rl_color_view(s->ocio, spec->display, view, NULL, spec->view_where, err);
+    if (!code)
+        code = rl_color_view(s->ocio, spec->display, view, spec->look, spec->look_where, err);
+    request->display = spec->display;
+    request->view = view;
+    *space = code ? NULL : rl_arena_printf(&s->arena, "%s / %s", spec->display, view);
+    return !code && !*space ? rl_fail_memory(err, strlen(view)) : code;
+}
+
 /* Only rgb images are colours; the graph knows formats later, so a converting output must name images that
  * turn out to be rgb: the graph's format check says so. */
 rl_code rl_session_make_output(rl_session *s, const rl_output *spec, rl_sink_output *out, rl_wanted *wanted,
@@ -46,40 +81,28 @@ rl_code rl_session_make_output(rl_session *s, const rl_output *spec, rl_sink_out
 {
     rl_color_pass pass = {0};
     const char *target = s->working;
+    rl_error why = {0};
     *out = (rl_sink_output){.spec = spec};
     bool exposed = spec->exposure != 0;
     rl_ocio_request request = {.from = s->working, .look = spec->look};
     rl_code code = RL_OK;
     if (spec->display) {
-        const char *view = spec->view;
-        rl_ocio_names views = {0};
-        code = rl_color_view(s->ocio, spec->display, NULL, NULL, spec->color_where, err);
-        if (!code && !view)
-            code = rl_ocio_list_names(s->ocio, RL_OCIO_VIEWS, spec->display, &s->arena, &views, err);
-        if (views.n > 0) /* OpenColorIO lists the default first */
-            view = views.names[0];
-        if (!code)
-            code = rl_color_view(s->ocio, spec->display, view, NULL, spec->view_where, err);
-        if (!code)
-            code = rl_color_view(s->ocio, spec->display, view, spec->look, spec->look_where, err);
-        request.display = spec->display;
-        request.view = view;
-        out->space = code ? NULL : rl_arena_printf(&s->arena, "%s / %s", spec->display, view);
-        if (!code && !out->space)
-            code = rl_fail_memory(err, strlen(view));
+        code = choose_view(s, spec, &request, &out->space, err);
     } else {
         if (spec->colorspace)
             code = rl_color_space(s->ocio, spec->colorspace, spec->color_where, &target, err);
         request.to = target;
         out->space = target;
         if (!code)
-            code = rl_color_primaries(s->ocio, target, spec->color_where, &out->primaries, err);
+            code = rl_color_primaries(s->ocio, target, spec->color_where, &out->primaries, &why);
     }
     bool converts =
         !code && (spec->display || spec->look || exposed || (spec->colorspace && strcmp(target, s->working)));
     if (converts)
         code =
-            rl_color_pass_new(s->ocio, &request, exposed, spec->color_where, &s->arena, s->log, &pass, err);
+            rl_color_pass_new(s->ocio, &request, exposed, spec->color_where, &s->arena, s->log, &pass, &why);
+    if (why.code)
+        return at_output(spec, &why, err);
     if (code)
         return code;
     const rl_pass **convert = rl_arena_array(&s->arena, spec->n_layers, sizeof *convert);
