@@ -523,7 +523,8 @@ static void test_broken_config(void **state)
                  "to_scene_reference: !<FileTransform> {src: gone.spi1d}",
                  "outputs.beauty.colorspace=ACEScct",
                  "--set outputs.beauty.colorspace=ACEScct:1:1: error: output 'beauty': OpenColorIO: ");
-    check_config("name: lin_rec709", "name: other", "graph.aa.blend=0.5", "'lin_rec709'");
+    check_config("name: lin_rec709", "name: other", "color.working=ACEScg",
+                 "(lights and albedo are in lin_rec709 unless their 'colorspace' says otherwise)");
 }
 
 /* ---- the machine -----------------------------------------------------------------------------------------
