@@ -85,7 +85,7 @@ static rl_code load_named(rl_session *s, const rl_value *named, rl_sequence *q, 
 {
     const char *path = rl_value_path(&s->arena, named);
     struct stat st;
-    if (path && is_yaml(path) && stat(path, &st))
+    if (path && !strpbrk(path, "#%") && stat(path, &st))
         return rl_fail(err, RL_E_IO, named->where, "the capture '%s' cannot be opened: %s", path,
                        strerror(errno));
     return load_manifest(s, path, q, err);
