@@ -23,8 +23,18 @@ static const rl_param params[] = {
 };
 RL_PARAMS_MATCH(sss_burley_params, 5);
 
+enum { WEIGHTING_SURFACE = 2 };
+
+static const rl_port ports[] = {
+    RL_ROWS_SCATTER_PORTS,
+    {"gain", RL_SCRATCH, RL_SCALAR, .help = "what curvature adds to the light, of one pixel of 4x4",
+     .layout = RL_PHASE4, .when = "weighting", .is = WEIGHTING_SURFACE},
+    RL_SCATTER_LEDGER(RL_PHASE4),
+};
+
 static const rl_step steps[] = {
     {"sss_burley_area", .domain = RL_EVERY_PHASE},
+    {"sss_burley_gain", .domain = RL_EVERY_PHASE, .when = "weighting", .is = WEIGHTING_SURFACE},
     {"sss_burley_filter", .domain = RL_EVERY_PHASE},
     {"sss_burley_resolve", .domain = RL_EVERY_VECTOR},
     {"sss_burley_energy", .domain = RL_EVERY_BAND, .with = "energy"},
@@ -148,12 +158,13 @@ const rl_pass rl_pass_sss_burley = {
     .help = "subsurface scattering with Burley's profile, a few importance-sampled taps a pixel",
     .source = "Golubev, Efficient screen-space subsurface scattering, SIGGRAPH 2018",
     .kernel = "sss_burley.cl",
-    .kernel_prelude = "energy.cl scatter.cl pattern.cl",
+    .kernel_prelude = "energy.cl scatter.cl scatter_surface.cl scatter_ledger.cl pattern.cl "
+                      "burley_taps.cl burley_gain.cl",
     .params = RL_ARRAY(params),
     .params_size = sizeof(sss_burley_params),
     .profile_keys = RL_ARRAY(rl_scatter_profile_rows),
     .shading_keys = RL_ARRAY(rl_scatter_shading_rows),
-    .ports = RL_ARRAY(rl_scatter_ports),
+    .ports = RL_ARRAY(ports),
     .steps = RL_ARRAY(steps),
     .tables = tables,
     .stochastic = stochastic,
