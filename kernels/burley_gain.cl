@@ -1,7 +1,7 @@
 /* weighting: surface (scatter_surface.cl) of sss_burley.cl, behind burley_taps.cl: gain, how much more or less light
  * than a flat surface a curved one sends out. It depends on the surface's shape alone, which changes less from pixel to
- * pixel than light and texture do: it is found for one pixel of 4x4, by as many taps as the filter has, and interpolated
- * between those of the same material. Where there is none within 4 pixels, it is taken for flat (`area`).
+ * pixel than light and texture do: it is found for one pixel of 4x4, by twice as many taps as the filter has, and
+ * interpolated between those of the same material. Where there is none within 4 pixels, it is taken for flat (`area`).
  *
  * How wrong: beside a gain for each pixel ... */
 
@@ -11,6 +11,7 @@
 /* The pixel of 4x4 that has one, (1, 1). Its three channels are in the sub-images of its phase and the next two. */
 #define GAIN_AT    1
 #define GAIN_PHASE (4 * GAIN_AT + GAIN_AT)
+#define GAIN_TAPS  2 /* times as many as the filter's, in patterns of their own behind the filter's */
 
 static inline int gain_stride(constant frame_t *f)
 {
@@ -23,34 +24,36 @@ static inline floatv plane_dz(const group_t *g, int dx, int dy)
     return scatter_plane_dz(g->z, g->plane.x * (float)dx + g->plane.y * (float)dy);
 }
 
-/* gain[c] by n taps of the group. */
+/* gain[c] by n taps of the group. What counts as black is on the tangent plane here, so it makes no gain; where the
+ * surface has turned away it has no weight. */
 static inline void sum_shape(const inputs_t *in, const group_t *g, global const float *taps, int n,
                              floatv gain[3])
 {
-    taps = pattern_of(g, taps, n);
-    floatv w[3] = {0.0f, 0.0f, 0.0f}, planar[3] = {0.0f, 0.0f, 0.0f};
+    floatv planar[3] = {0.0f, 0.0f, 0.0f}, more[3] = {0.0f, 0.0f, 0.0f};
     floatv per_own = 1.0f / rl_vload(0, in->area + g->v.at);
     taps_t block;
+    taps = pattern_of(g, taps, n);
     for (int first = 0; first < n; first += TAP_BLOCK) {
         int last = min(TAP_BLOCK, n - first);
         place_taps(in, g, taps, tap_stride(n), first, last, &block);
         for (int i = 0; i < last; i++) {
             int a = block.at[i];
             intv id = rl_as_intv(rl_vload(0, in->stencil + a)), same = id == g->material;
-            floatv other = rl_vload(0, in->depth + a), flat = plane_dz(g, block.dx[i], block.dy[i]), e[3];
+            floatv other = rl_vload(0, in->depth + a), flat = plane_dz(g, block.dx[i], block.dy[i]), p[3], w[3];
             intv away = scatter_turned_away(in, &g->v, block.dx[i], block.dy[i], id, other, g->z + flat);
-            floatv on_plane = block.weight[i] * scatter_plane_area(g->z, flat);
-            weigh_tap(g, &block, i, flat * g->inv_d, on_plane, same | away | g->keep, e);
-            for (int c = 0; c < 3; c++)
-                planar[c] += e[c];
-            floatv stands = rl_select(on_plane, block.weight[i] * rl_vload(0, in->area + a) * per_own, same);
-            weigh_tap(g, &block, i, rl_select(flat, other - g->z, same) * g->inv_d, stands, same | g->keep, e);
-            for (int c = 0; c < 3; c++)
-                w[c] += e[c];
+            intv curved = same | (away & ~g->keep);
+            weigh_tap(g, &block, i, flat * g->inv_d, block.weight[i] * scatter_plane_area(g->z, flat),
+                      curved | g->keep, p);
+            weigh_tap(g, &block, i, (other - g->z) * g->inv_d,
+                      block.weight[i] * rl_vload(0, in->area + a) * per_own, same, w);
+            for (int c = 0; c < 3; c++) {
+                planar[c] += p[c];
+                more[c] += w[c] - scatter_keep(p[c], curved);
+            }
         }
     }
     for (int c = 0; c < 3; c++)
-        gain[c] = scatter_keep(w[c] / planar[c] - 1.0f, w[c] > MIN_WEIGHT);
+        gain[c] = scatter_keep(more[c] / planar[c], planar[c] > MIN_WEIGHT);
 }
 
 /* The gain of the pixels that have one, in `to`. */
@@ -62,6 +65,8 @@ static inline void find_gain(const inputs_t *in, constant params_t *p, constant 
     vector_t v = scatter_vector(in->f);
     intv id = rl_as_intv(rl_vload(0, in->stencil + v.at)), left = id != 0;
     floatv gain[3] = {0.0f, 0.0f, 0.0f};
+    int n = min(GAIN_TAPS * (p->taps > 0 ? p->taps : TAPS_MANY), MOST_TAPS);
+    int skip = p->taps > 0 ? patterns_floats(p->taps) : patterns_floats(TAPS_SOME) + patterns_floats(TAPS_MANY);
     while (scatter_any(left)) {
         int m = scatter_max_int(id & left);
         intv mine = left & (id == m);
@@ -69,11 +74,11 @@ static inline void find_gain(const inputs_t *in, constant params_t *p, constant 
         if (!materials[m].has_profile)
             continue;
         group_t g = group_of(in, &v, p, tables, m, &materials[m]);
-        global const float *taps = tables + (int)tables[TABLE_PATTERNS + m];
+        global const float *taps = tables + (int)tables[TABLE_PATTERNS + m] + skip;
         while (scatter_any(mine)) {
             intv now = take_group(in, &g, &mine);
             floatv found[3];
-            sum_shape(in, &g, p->taps > 0 ? taps : taps + BEHIND_SOME, p->taps > 0 ? p->taps : TAPS_MANY, found);
+            sum_shape(in, &g, taps, n, found);
             for (int c = 0; c < 3; c++)
                 gain[c] = rl_select(gain[c], found[c], now);
         }

@@ -16,6 +16,7 @@
 /* Patterns for a number of taps: as passes/sss_burley.c makes them. */
 #define MOST_PATTERNS 15
 #define PATTERN_TAPS  4096
+#define MOST_TAPS     4096
 
 #if P_weighting != WEIGHTING_PLAIN
 #define AREA(x) x
@@ -47,8 +48,7 @@ typedef struct group_t {
 #endif
     float squeeze[3]; /* xx, xy, yy: from the disk to the screen's plane, less the identity */
     int material;
-    intv keep;    /* all bits: samples that are none count as black */
-    int occludes; /* the same of all lanes */
+    intv keep;        /* all bits: samples that are none count as black */
 } group_t;
 
 /* TAP_BLOCK taps of a group, or fewer. */
@@ -205,8 +205,7 @@ static inline group_t group_of(const inputs_t *in, const vector_t *v, constant p
     g.plane = scatter_plane(in, v);
 #endif
     g.material = material;
-    g.occludes = mat->profile_border == BORDER_OCCLUDE;
-    g.keep = g.occludes ? -1 : 0;
+    g.keep = mat->profile_border == BORDER_OCCLUDE ? -1 : 0;
     return g;
 }
 
@@ -235,5 +234,8 @@ static inline global const float *pattern_of(const group_t *g, global const floa
     return taps + (3 * tap_stride(n) + 3) * (int)mul_hi(g->spread, (uint)pattern_count(n));
 }
 
-/* The patterns of TAPS_MANY behind those of TAPS_SOME, with `taps: auto`. */
-#define BEHIND_SOME ((3 * TAP_BLOCK + 3) * MOST_PATTERNS)
+/* What the patterns for n taps take. */
+static inline int patterns_floats(int n)
+{
+    return (3 * tap_stride(n) + 3) * pattern_count(n);
+}

@@ -59,17 +59,7 @@ static inline void sum_taps(const inputs_t *in, const group_t *g, global const f
             intv same = rl_as_intv(rl_vload(0, in->stencil + a)) == g->material;
             floatv dz = scatter_keep((rl_vload(0, in->depth + a) - g->z) * g->inv_d, same);
             floatv stands = block.weight[i], e[3];
-#if P_weighting == WEIGHTING_SURFACE
-            floatv black_dz = 0.0f, black_area = 1.0f;
-            if (g->occludes) { /* what is black lies on the tangent plane */
-                black_dz = plane_dz(g, block.dx[i], block.dy[i]);
-                black_area = scatter_plane_area(g->z, black_dz);
-            }
-            dz = rl_select(black_dz * g->inv_d, dz, same);
-            stands *= rl_select(black_area, rl_vload(0, in->area + a) * per_own, same);
-#elif P_weighting == WEIGHTING_AREA
-            stands *= rl_select((floatv)1.0f, rl_vload(0, in->area + a) * per_own, same);
-#endif
+            AREA(stands *= rl_select((floatv)1.0f, rl_vload(0, in->area + a) * per_own, same);)
             weigh_tap(g, &block, i, dz, stands, same | g->keep, e);
             w0 += e[0];
             w1 += e[1];
@@ -126,7 +116,7 @@ static inline void filter_group(const inputs_t *in, const group_t *g, constant p
         if (scatter_any(now & (many < 1.0f)))
             sum_taps(in, g, taps, TAPS_SOME, bend, sum);
         if (scatter_any(now & (many > 0.0f)))
-            sum_taps(in, g, taps + BEHIND_SOME, TAPS_MANY, bend, fine);
+            sum_taps(in, g, taps + patterns_floats(TAPS_SOME), TAPS_MANY, bend, fine);
         for (int c = 0; c < SCATTER_OUT; c++) {
             sum[c] = fma(many, fine[c] - sum[c], sum[c]);
             sum[c] = fma(some, sum[c] - out[c], out[c]);

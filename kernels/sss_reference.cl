@@ -5,7 +5,7 @@
 
 typedef struct sums_t {
     floatv w[3], c[3]; /* weights; weights times light */
-    floatv p[3];       /* weighting: surface: weights on the tangent plane */
+    floatv p[3], more[3]; /* weighting: surface: weights on the tangent plane, and how much more those of the surface are */
 #if WANTS_energy
     rejected_t rejected;
 #endif
@@ -13,9 +13,9 @@ typedef struct sums_t {
 
 #define NO_LIGHT {0.0f, 0.0f, 0.0f}
 #if WANTS_energy
-#define NO_SUMS {NO_LIGHT, NO_LIGHT, NO_LIGHT, {NO_LIGHT, NO_LIGHT}}
+#define NO_SUMS {NO_LIGHT, NO_LIGHT, NO_LIGHT, NO_LIGHT, {NO_LIGHT, NO_LIGHT}}
 #else
-#define NO_SUMS {NO_LIGHT, NO_LIGHT, NO_LIGHT}
+#define NO_SUMS {NO_LIGHT, NO_LIGHT, NO_LIGHT, NO_LIGHT}
 #endif
 
 /* What is constant for the pixels of one vector and one material. */
@@ -101,8 +101,7 @@ static inline void weigh(const centre_t *at, int dx, int dy, floatv dz, floatv w
 }
 
 /* The weights that samples would have which are none, for the ledger. */
-static inline void reject(const inputs_t *in, const centre_t *at, int dx, int dy, floatv dz, intv none,
-                          sums_t *s)
+static inline void reject(const inputs_t *in, const centre_t *at, int dx, int dy, intv none, sums_t *s)
 {
 #if WANTS_energy
     floatv w[3], area = 1.0f;
@@ -111,18 +110,39 @@ static inline void reject(const inputs_t *in, const centre_t *at, int dx, int dy
 #if P_weighting != WEIGHTING_PLAIN
     area = rl_vload(0, in->area + at->v.at);
 #endif
-    weigh(at, dx, dy, dz, w);
+    weigh(at, dx, dy, 0.0f, w);
     intv inside = scatter_inside(in->f, &at->v, dx, dy);
     for (int c = 0; c < 3; c++)
         scatter_reject(&s->rejected, c, scatter_keep(w[c] * area, none), inside);
 #endif
 }
 
+#if P_weighting == WEIGHTING_SURFACE
+/* The same pixels on the tangent plane, for the gain: `w` are the weights of those in `same`. What counts as black is on
+ * the plane, so it makes no gain; where the surface has turned away it has no weight. */
+static inline void gather_plane(const inputs_t *in, const centre_t *at, int dx, int dy, intv near, intv same,
+                                intv id, floatv other, const floatv w[3], sums_t *s)
+{
+    floatv flat = scatter_plane_dz(at->z, at->plane.x * (float)dx + at->plane.y * (float)dy);
+    intv away = near & scatter_turned_away(in, &at->v, dx, dy, id, other, at->z + flat);
+    intv counts = same | away | (near & at->keep);
+    if (!scatter_any(counts))
+        return;
+    floatv p[3], stands = rl_vload(0, in->area + at->v.at) * scatter_plane_area(at->z, flat);
+    weigh(at, dx, dy, flat, p);
+    for (int c = 0; c < 3; c++) {
+        p[c] = scatter_keep(p[c] * stands, counts);
+        s->p[c] += p[c];
+        s->more[c] += scatter_keep(w[c], same) - scatter_keep(p[c], same | (away & ~at->keep));
+    }
+}
+#endif
+
 /* The pixels (dx, dy) away join the sums of the lanes in `mine`. */
 static inline void gather(const inputs_t *in, const centre_t *at, int dx, int dy, intv mine, sums_t *s)
 {
+    floatv rise = 0.0f; /* how much deeper the disk is */
     float x = (float)dx * at->px, y = (float)dy * at->py;
-    floatv flat = 0.0f, rise = 0.0f; /* how much deeper the tangent plane and the disk are */
 #if P_orientation == ORIENTATION_TANGENT
     rise = scatter_plane_dz(at->z, at->z * (at->tilt_x * x + at->tilt_y * y));
 #endif
@@ -130,36 +150,25 @@ static inline void gather(const inputs_t *in, const centre_t *at, int dx, int dy
     intv near = mine & (far2_of(at, x, y, rise) <= at->reach * at->reach);
     intv id = rl_as_intv(rl_vload(0, in->stencil + i)), same = near & (id == at->material);
     intv counts = near & (same | at->keep);
-    floatv other = rl_vload(0, in->depth + i), w[3];
+    floatv other = rl_vload(0, in->depth + i), w[3] = NO_LIGHT;
+    reject(in, at, dx, dy, near & ~same, s);
+    if (scatter_any(counts)) {
+        weigh(at, dx, dy, scatter_keep(other - at->z, same), w);
 #if P_weighting != WEIGHTING_PLAIN
-    floatv own = rl_vload(0, in->area + at->v.at); /* what stands for samples that are none */
-#endif
-#if P_weighting == WEIGHTING_SURFACE
-    flat = scatter_plane_dz(at->z, at->plane.x * (float)dx + at->plane.y * (float)dy);
-    own *= scatter_plane_area(at->z, flat);
-    intv away = scatter_turned_away(in, &at->v, dx, dy, id, other, at->z + flat);
-    intv planar = near & (same | at->keep | away);
-    if (scatter_any(planar)) {
-        floatv p[3];
-        weigh(at, dx, dy, flat, p);
+        floatv stands = rl_vload(0, in->area + at->v.at);
+        stands = rl_select(stands, rl_vload(0, in->area + i), same);
         for (int c = 0; c < 3; c++)
-            s->p[c] += scatter_keep(p[c] * own, planar);
-    }
+            w[c] *= stands;
 #endif
-    reject(in, at, dx, dy, flat, near & ~same, s);
-    if (!scatter_any(counts))
-        return;
-    weigh(at, dx, dy, rl_select(flat, other - at->z, same), w);
-#if P_weighting != WEIGHTING_PLAIN
-    own = rl_select(own, rl_vload(0, in->area + i), same);
-    for (int c = 0; c < 3; c++)
-        w[c] *= own;
-#endif
-    for (int c = 0; c < 3; c++) {
-        w[c] = scatter_keep(w[c], counts);
-        s->w[c] += w[c];
-        s->c[c] = fma(w[c], scatter_keep(rl_vload(0, in->diffuse + c * in->f->plane4 + i), same), s->c[c]);
+        for (int c = 0; c < 3; c++) {
+            w[c] = scatter_keep(w[c], counts);
+            s->w[c] += w[c];
+            s->c[c] = fma(w[c], scatter_keep(rl_vload(0, in->diffuse + c * in->f->plane4 + i), same), s->c[c]);
+        }
     }
+#if P_weighting == WEIGHTING_SURFACE
+    gather_plane(in, at, dx, dy, near, same, id, other, w, s);
+#endif
 }
 
 static inline void filter_material(const inputs_t *in, const vector_t *v, int material,
@@ -202,6 +211,7 @@ static inline void filter_material(const inputs_t *in, const vector_t *v, int ma
             total.w[c] += row.w[c];
             total.c[c] += row.c[c];
             total.p[c] += row.p[c];
+            total.more[c] += row.more[c];
 #if WANTS_energy
             total.rejected.border[c] += row.rejected.border[c];
             total.rejected.off_screen[c] += row.rejected.off_screen[c];
@@ -211,7 +221,7 @@ static inline void filter_material(const inputs_t *in, const vector_t *v, int ma
     for (int c = 0; c < 3; c++) {
         floatv over = 1.0f / total.w[c];
 #if P_weighting == WEIGHTING_SURFACE
-        over = fma(cosine, 1.0f / total.p[c] - over, over);
+        over *= fma(cosine, total.more[c] / total.p[c], (floatv)1.0f);
 #endif
 #if WANTS_energy
         floatv all[SCATTER_OUT], own = out[c];
