@@ -43,10 +43,10 @@ static const rl_step steps[] = {
 /* As kernels/sss_burley.cl reads it: 256 directions (cos, sin); for each material where its patterns start,
  * in floats from the table's start (exact, below 2^24); the patterns, which materials whose channels have the
  * same proportions share. A set of patterns is those for `taps`, or with `auto` those for 21 and those for
- * 55, and with `weighting: surface` those for the gain, twice as many taps. There are up to 15 for a number of taps, an odd number of them, their radii offset by (j +
- * 1/2)/patterns: the one in the middle by a half. A pattern is its x, y and weights, each padded to a
- * multiple of 64, and for each channel the sum of its weights on a plane beside the mean of those of all
- * patterns. */
+ * 55, and with `weighting: surface` those for the gain, twice as many taps. There are up to 15 for a number
+ * of taps, an odd number of them, their radii offset by (j + 1/2)/patterns: the one in the middle by a half.
+ * A pattern is its x, y and weights, each padded to a multiple of 64, and for each channel the sum of its
+ * weights on a plane beside the mean of those of all patterns. */
 enum { TURNS = 256, TAP_BLOCK = 64, MOST_PATTERNS = 15, PATTERN_TAPS = 4096, MOST_TAPS = 4096 };
 
 static size_t tap_stride(size_t taps)
@@ -82,8 +82,8 @@ static void make_patterns(size_t taps, const double d[3], float *to)
             to[j * (3 * stride + 3) + 3 * stride + (size_t)c] = (float)(sum[j][c] / mean[c]);
 }
 
-/* For how many taps there are patterns: those for one size on screen or for two, and twice as many as the larger to find
- * the gain with. Returns how many counts. */
+/* For how many taps there are patterns: those for one size on screen or for two, and twice as many as the
+ * larger to find the gain with. Returns how many counts. */
 static size_t tap_counts(const sss_burley_params *p, size_t counts[3])
 {
     size_t n = 0;
