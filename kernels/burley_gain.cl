@@ -3,7 +3,8 @@
  * pixel than light and texture do: it is found for one pixel of 4x4, by twice as many taps as the filter has, and
  * interpolated between those of the same material. Where there is none within 4 pixels, it is taken for flat (`area`).
  *
- * How wrong: beside a gain for each pixel ... */
+ * How wrong: beside a gain for each pixel, in a dense sum, results differ by 0.04 to 0.08 % on average on a captured head,
+ * and by 0.04 to 0.16 % on a ball of wax 92 pixels wide. */
 
 #if P_weighting == WEIGHTING_SURFACE
 #define BEND(x) x
