@@ -14,6 +14,7 @@
 #include "graph/base/alloc.h"
 #include "graph/base/pool.h"
 #include "tests/color_help.h"
+#include "tests/tool_run.h"
 
 #define CONFIG "configs/color/relit.ocio"
 
@@ -283,6 +284,54 @@ static void test_unknown_names(void **state)
     assert_string_equal(err.file, "no/such.ocio");
 }
 
+/* One with other names for its spaces still has lin_rec709, the same one; one without the role cannot. */
+static void test_rec709_of_others(void **state)
+{
+    (void)state;
+    static const char *const changes[][2] = {
+        {"name: lin_rec709", "name: other"},                              /* ACES2065-1 is the reference */
+        {"aces_interchange: ACES2065-1", "aces_interchange: aces_of_it"}, /* …or leads to it */
+        {"aces_interchange: ACES2065-1", "matte: raw"}};
+    static const char added[] =
+        "\n  - !<ColorSpace>\n    name: aces_of_it\n    encoding: scene-linear\n"
+        "    from_scene_reference: !<MatrixTransform> {matrix: [2, 0, 0, 0, 0, 2, 0, 0, "
+        "0, 0, 2, 0, 0, 0, 0, 1]}\n";
+    size_t size;
+    char *folder = folder_new(), *path = path_in(folder, "other.ocio"), *own = file_read(CONFIG, &size);
+    for (int i = 0; i < 3; i++) {
+        char *renamed = text_replace(own, changes[0][0], changes[0][1]);
+        char *changed = i ? text_replace(renamed, changes[i][0], changes[i][1]) : strdup(renamed);
+        char *text = malloc(strlen(changed) + sizeof added);
+        strcat(strcpy(text, changed), added);
+        char *roles = text_replace(text, "scene_linear: lin_rec709", "scene_linear: ACEScg");
+        file_write(folder, "other.ocio", roles, strlen(roles));
+        rl_ocio *theirs = NULL;
+        rl_ocio_transform *a = NULL, *b = NULL;
+        const rl_ocio_request request = {.from = "lin_rec709", .to = "ACES2065-1"};
+        float x[3][2] = {{0.5f, 0.5f}, {0.25f, 0.25f}, {2, 2}};
+        assert_int_equal(rl_ocio_open(path, &theirs, NULL), RL_OK);
+        assert_true((rl_ocio_space(theirs, "lin_rec709") != NULL) == (i < 2));
+        if (i < 2) {
+            assert_int_equal(rl_ocio_transform_new(config, &request, &a, NULL), RL_OK);
+            assert_int_equal(rl_ocio_transform_new(theirs, &request, &b, NULL), RL_OK);
+            assert_int_equal(rl_ocio_apply(a, &x[0][0], &x[1][0], &x[2][0], 1, NULL), RL_OK);
+            assert_int_equal(rl_ocio_apply(b, &x[0][1], &x[1][1], &x[2][1], 1, NULL), RL_OK);
+            for (int c = 0; c < 3; c++) /* the second's ACES2065-1 is half of what it calls so */
+                assert_true(fabsf(x[c][1] * (i ? 2 : 1) - x[c][0]) <= 2e-6f);
+        }
+        rl_ocio_transform_free(&a);
+        rl_ocio_transform_free(&b);
+        rl_ocio_free(&theirs);
+        free(renamed);
+        free(changed);
+        free(text);
+        free(roles);
+    }
+    free(path);
+    free(own);
+    folder_remove(folder);
+}
+
 static void test_primaries(void **state)
 {
     static const double rec709[8] = {0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290};
@@ -329,6 +378,7 @@ int main(void)
         cmocka_unit_test(test_rows_on_threads),
         cmocka_unit_test(test_names),
         cmocka_unit_test(test_unknown_names),
+        cmocka_unit_test(test_rec709_of_others),
         cmocka_unit_test(test_primaries),
         cmocka_unit_test(test_unnamed_primaries),
     };

@@ -524,8 +524,9 @@ static void test_broken_config(void **state)
                  "to_scene_reference: !<FileTransform> {src: gone.spi1d}",
                  "outputs.beauty.colorspace=ACEScct",
                  "--set outputs.beauty.colorspace=ACEScct:1:1: error: output 'beauty': OpenColorIO: ");
-    check_config("name: lin_rec709", "name: other", "color.working=ACEScg",
-                 "(lights and albedo are in lin_rec709 unless their 'colorspace' says otherwise)");
+    /* whoever renames it, but for the role, has to name it elsewhere */
+    check_config("aces_interchange: ACES2065-1", "compositing_linear: raw", "lights.key.colorspace=lin_rec70",
+                 "did you mean 'lin_rec709'?");
 }
 
 /* ---- the machine -----------------------------------------------------------------------------------------

@@ -74,6 +74,39 @@ static const char *reason(const char *message)
     return behind ? behind + sizeof failed - 1 : message;
 }
 
+/* Lights and albedo are in lin_rec709 unless they say otherwise. A configuration that has no space of that
+ * name gets one, exactly: Rec. 709 primaries, D65 adapted as OpenColorIO's own transforms do, by way of the
+ * space that it declares to be ACES2065-1. */
+static OCIO::ConstConfigRcPtr with_rec709(const OCIO::ConstConfigRcPtr &config)
+{
+    OCIO::ConstColorSpaceRcPtr aces = config->getColorSpace(OCIO::ROLE_INTERCHANGE_SCENE);
+    if (config->getColorSpace("lin_rec709") || !aces || config->getMajorVersion() < 2)
+        return config;
+    OCIO::GroupTransformRcPtr to_reference = OCIO::GroupTransform::Create();
+    OCIO::BuiltinTransformRcPtr to_ap1 = OCIO::BuiltinTransform::Create(),
+                                to_aces = OCIO::BuiltinTransform::Create();
+    to_ap1->setStyle("UTILITY - ACES-AP1_to_LINEAR-REC709_BFD");
+    to_ap1->setDirection(OCIO::TRANSFORM_DIR_INVERSE);
+    to_aces->setStyle("ACEScg_to_ACES2065-1");
+    to_reference->appendTransform(to_ap1);
+    to_reference->appendTransform(to_aces);
+    OCIO::ConstTransformRcPtr there = aces->getTransform(OCIO::COLORSPACE_DIR_TO_REFERENCE),
+                              back = aces->getTransform(OCIO::COLORSPACE_DIR_FROM_REFERENCE);
+    if (there || back) {
+        OCIO::GroupTransformRcPtr rest = OCIO::GroupTransform::Create();
+        rest->appendTransform((there ? there : back)->createEditableCopy());
+        rest->setDirection(there ? OCIO::TRANSFORM_DIR_FORWARD : OCIO::TRANSFORM_DIR_INVERSE);
+        to_reference->appendTransform(rest);
+    }
+    OCIO::ColorSpaceRcPtr space = OCIO::ColorSpace::Create();
+    space->setName("lin_rec709");
+    space->setEncoding("scene-linear");
+    space->setTransform(to_reference, OCIO::COLORSPACE_DIR_TO_REFERENCE);
+    OCIO::ConfigRcPtr copy = config->createEditableCopy();
+    copy->addColorSpace(space);
+    return copy;
+}
+
 extern "C" rl_code rl_ocio_open(const char *path, rl_ocio **out, rl_error *err)
 {
     *out = nullptr;
@@ -87,7 +120,7 @@ extern "C" rl_code rl_ocio_open(const char *path, rl_ocio **out, rl_error *err)
     try {
         /* What OpenColorIO prints otherwise, it also throws. */
         OCIO::SetLoggingLevel(OCIO::LOGGING_LEVEL_NONE);
-        ocio->config = OCIO::Config::CreateFromFile(path);
+        ocio->config = with_rec709(OCIO::Config::CreateFromFile(path));
     } catch (const std::exception &e) {
         code = rl_fail_file(err, RL_E_COLOR, path, "not a colour configuration that OpenColorIO can read: %s",
                             reason(e.what()));

@@ -19,7 +19,8 @@ extern "C" {
 typedef struct rl_ocio rl_ocio;                     /* a configuration */
 typedef struct rl_ocio_transform rl_ocio_transform; /* a processor made from one; keeps what it needs alive */
 
-/* `path` is a config file; RL_E_IO when there is none that can be opened. Free with rl_ocio_free. */
+/* `path` is a config file; RL_E_IO when there is none that can be opened. Has the space lin_rec709 also where
+ * the file has none, as long as the file has the role aces_interchange. Free with rl_ocio_free. */
 rl_code rl_ocio_open(const char *path, rl_ocio **out, rl_error *err);
 void rl_ocio_free(rl_ocio **ocio);
 
