@@ -346,6 +346,10 @@ static void test_errors(void **state)
     rl_error_format(&err, out, 10);
     assert_string_equal(out, "a.yaml:3:");
     err = (rl_error){0};
+    rl_fail_file(&err, RL_E_IO, "a\n\033[31m\xff.yaml", "x");
+    rl_error_format(&err, out, sizeof out);
+    assert_string_equal(out, "a ?[31m?.yaml: error: x");
+    err = (rl_error){0};
     char path[700];
     memset(path, 'a', sizeof path);
     strcpy(path + 690, "/tail.exr");

@@ -118,6 +118,7 @@ static const row rows[] = {
     {"two outputs of one file", "frame:04}.png\"", "frame:04}.exr\"", .says = {"pipe.yaml:", "beauty", "view"}},
     /* captures */
     {"missing manifest", "capture: capture.yaml", "capture: gone.yaml", .at = "gone.yaml", .says = {"the capture '", "gone.yaml' cannot be opened: No such file"}},
+    {"a name with a line's end", .arguments = {"--capture", "a\nb\033[1m.yaml"}, .says = {"a b?[1m.yaml: error: cannot be opened"}},
     {"missing folder", "capture: capture.yaml", "capture: gone/", .at = "gone/", .says = {"the capture '", "gone/' cannot be opened: No such file"}},
     {"missing manifest of --capture", .arguments = {"--capture", "gone.yaml"}, .says = {"gone.yaml: error: cannot be opened: No such file"}},
     {"missing files", "monkey.####.exr", "gone.####.exr", true, .says = {"gone."}},

@@ -83,6 +83,8 @@ void rl_error_format(const rl_error *err, char *out, unsigned long size)
     else if (err->file[0])
         snprintf(place, sizeof place, "%s: ", err->file);
     snprintf(out, size, "%serror: %s", place, err->text);
+    if (size)
+        rl_one_line(out); /* a file's name may hold anything */
 }
 
 const char *rl_code_text(rl_code code)

@@ -35,11 +35,15 @@ static void hide_bar(rl_reporter *r)
 
 static void print_line(rl_reporter *r, rl_where where, const char *color, const char *word, const char *text)
 {
+    char file[1024] = "";
     hide_bar(r);
-    if (where.file && *where.file && where.line > 0)
-        fprintf(r->err, "%s:%d:%d: ", where.file, where.line, where.column);
-    else if (where.file && *where.file)
-        fprintf(r->err, "%s: ", where.file);
+    if (where.file)
+        snprintf(file, sizeof file, "%s", where.file);
+    rl_one_line(file); /* a file's name may hold anything, what a terminal obeys included */
+    if (*file && where.line > 0)
+        fprintf(r->err, "%s:%d:%d: ", file, where.line, where.column);
+    else if (*file)
+        fprintf(r->err, "%s: ", file);
     fprintf(r->err, "%s%s:%s %s\n", r->color ? color : "", word, r->color ? PLAIN : "", text);
     fflush(r->err);
 }
