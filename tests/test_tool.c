@@ -685,6 +685,23 @@ static void test_devices(void **state)
 /* ---- the program -----------------------------------------------------------------------------------------
  */
 
+/* Pictures are written, but who reads the objects does not get them: no success. */
+static void test_full_output(void **state)
+{
+    (void)state;
+    char *pipe, *folder = enter(&pipe), *out = path_in(folder, "out"), command[2048];
+    const char *shell[] = {"-c", command, NULL};
+    snprintf(command, sizeof command, "exec '%s' run '%s' --out '%s' --frames 1 --quiet --json > /dev/full",
+             tool_program(), pipe, out);
+    tool_result r = tool_spawn("/bin/sh", NULL, shell);
+    expect(&r, 1);
+    assert_non_null(strstr(r.err, "error: standard output could not be written"));
+    assert_int_equal(folder_files(out), 2);
+    tool_result_free(&r);
+    free(out);
+    leave(folder, pipe);
+}
+
 static void test_program(void **state)
 {
     (void)state;
@@ -726,6 +743,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(test_passes),
         cmocka_unit_test(test_kernel_example),
         cmocka_unit_test(test_devices),
+        cmocka_unit_test(test_full_output),
         cmocka_unit_test(test_program),
     };
     return cmocka_run_group_tests_name("tool", tests, NULL, NULL);

@@ -195,6 +195,8 @@ static int run_all(rl_ab_run *r, rl_error *err)
         finish = rl_ab_finish(r, now_s() - begin, &over, &unwritten);
     if (!finish && r->trace)
         finish = rl_trace_write(r->trace, r->tool->args.trace, &unwritten);
+    if (!finish)
+        finish = rl_report_arrived(report, &unwritten);
     if (finish)
         rl_report_error(report, &unwritten);
     return status_of(run, finish, &summary, over, signal, err);

@@ -67,6 +67,8 @@ int rl_cmd_run(rl_tool *tool, rl_error *err)
     status = status_of(code, &summary, signal, err);
     if (sinks.trace && rl_trace_write(sinks.trace, tool->args.trace, err) && status == RL_EXIT_DONE)
         status = RL_EXIT_FRAME;
+    if (rl_report_arrived(tool->report, err) && status == RL_EXIT_DONE)
+        status = RL_EXIT_FRAME;
 done:
     rl_session_close(&session);
     rl_trace_free(&sinks.trace);

@@ -111,6 +111,13 @@ rl_code rl_report_result(rl_reporter *r, const char *text, rl_error *err)
     return good ? RL_OK : rl_fail(err, RL_E_IO, RL_NOWHERE, "standard output cannot be written");
 }
 
+rl_code rl_report_arrived(const rl_reporter *r, rl_error *err)
+{
+    return r->lost ? rl_fail(err, RL_E_IO, RL_NOWHERE,
+                             "standard output could not be written: frames are missing in it")
+                   : RL_OK;
+}
+
 /* ---- progress -------------------------------------------------------------------------------------------
  */
 
@@ -157,9 +164,8 @@ static void frame_json(rl_reporter *r, const rl_frame_result *f)
     json_object_update_new(
         object, json_pack("{s:I, s:I}", "done", (json_int_t)f->done, "total", (json_int_t)f->total));
     char *text = object ? json_dumps(object, JSON_COMPACT | JSON_REAL_PRECISION(6)) : NULL;
-    if (text)
-        fprintf(r->out, "%s\n", text);
-    fflush(r->out);
+    if (!text || fprintf(r->out, "%s\n", text) < 0 || fflush(r->out))
+        r->lost = true;
     free(text);
     json_decref(object);
 }

@@ -27,6 +27,7 @@ typedef struct rl_reporter {
     uint64_t begin;             /* ns on CLOCK_MONOTONIC */
     long long stages[RL_LANES]; /* the frame that each stage is at, */
     bool staged[RL_LANES];      /* if it is at one */
+    bool lost;                  /* an object of --json could not be written */
     size_t done, total;         /* of the last frame that was reported */
     rl_str failed;              /* a line for each frame that failed: "monkey frame 3: why" */
     size_t n_files;
@@ -40,6 +41,9 @@ void rl_reporter_end(rl_reporter *r);
 void rl_report_error(rl_reporter *r, const rl_error *err);
 /* A command's result, on stdout, all of it or an error: a full disk must not end with status 0. */
 rl_code rl_report_result(rl_reporter *r, const char *text, rl_error *err);
+
+/* Whether all objects of --json arrived: asked at the end of a run. */
+rl_code rl_report_arrived(const rl_reporter *r, rl_error *err);
 
 /* Progress of a run. A frame: a bar on a terminal, a line elsewhere, an object with --json. */
 void rl_report_run_begin(rl_reporter *r);
