@@ -691,8 +691,9 @@ static void test_full_output(void **state)
     (void)state;
     char *pipe, *folder = enter(&pipe), *out = path_in(folder, "out"), command[2048];
     const char *shell[] = {"-c", command, NULL};
-    snprintf(command, sizeof command, "exec '%s' run '%s' --out '%s' --frames 1 --quiet --json > /dev/full",
-             tool_program(), pipe, out);
+    snprintf(command, sizeof command,
+             "exec '%s' run '%s' --out '%s' --capture '%s' --frames 1 --quiet --json > /dev/full",
+             tool_program(), pipe, out, capture);
     tool_result r = tool_spawn("/bin/sh", NULL, shell);
     expect(&r, 1);
     assert_non_null(strstr(r.err, "error: standard output could not be written"));
