@@ -317,6 +317,11 @@ static void test_nearest(void **state)
     assert_null(rl_nearest("", known, 5));
     assert_null(rl_nearest("x", (const char *const[]){"y"}, 1));
     assert_null(rl_nearest("taps", known, 0));
+    static const char *const words[] = {"lambert", "tangent", "roughness", "shadow", "shadow_steps"};
+    assert_string_equal(rl_nearest("lamb", words, 5), "lambert"); /* a beginning, */
+    assert_string_equal(rl_nearest("Tan", words, 5), "tangent");
+    assert_null(rl_nearest("sha", words, 5)); /* of one only, */
+    assert_null(rl_nearest("ta", words, 5));  /* and of some length */
     char a[300], b[300];
     memset(a, 'a', 299);
     memset(b, 'a', 299);

@@ -16,6 +16,7 @@
 
 #include "graph/model/pass.h"
 #include "graph/relit.h"
+#include "graph/run/exr.h"
 #include "tests/tool_run.h"
 
 static char capture[PATH_MAX]; /* captures/monkey */
@@ -100,6 +101,18 @@ static void test_help(void **state)
         tool_result_free(&one);
     }
     tool_result_free(&r);
+    r = RUN("help", "plan");
+    tool_result same = RUN("plan", "--help");
+    expect(&r, 0);
+    assert_string_equal(r.out, same.out);
+    tool_result_free(&r);
+    tool_result_free(&same);
+    r = RUN("help");
+    same = RUN("--help");
+    expect(&r, 0);
+    assert_string_equal(r.out, same.out);
+    tool_result_free(&r);
+    tool_result_free(&same);
 }
 
 static void test_version(void **state)
@@ -367,13 +380,67 @@ static void test_check_writes_nothing(void **state)
     r = RUN("check", pipe, "--capture", capture, "--json");
     expect(&r, 0);
     json_t *json = json_loads(r.out, 0, NULL);
-    assert_non_null(json);
+    assert_true(json_is_true(json_object_get(json, "ok")));
+    assert_int_equal(json_array_size(json_object_get(json, "errors")), 0);
     json_decref(json);
+    tool_result_free(&r);
+    r = RUN("check", pipe, "--capture", capture, "--quiet");
+    expect(&r, 0);
+    assert_string_equal(r.out, "");
+    assert_string_equal(r.err, "");
     tool_result_free(&r);
     r = RUN("check", pipe, "--capture", capture, "--out", pipe);
     expect(&r, 2); /* a file is in the way */
     tool_result_free(&r);
     free(out);
+    leave(folder, pipe);
+}
+
+/* What is wrong is on stdout with --json, too. */
+static void test_check_json_failure(void **state)
+{
+    (void)state;
+    char *pipe, *folder = enter(&pipe);
+    tool_result r = RUN("check", pipe, "--capture", capture, "--json", "--set", "graph.sss.tapps=3");
+    expect(&r, 2);
+    assert_int_equal(lines(r.err), 1);
+    json_t *json = json_loads(r.out, 0, NULL), *errors = json_object_get(json, "errors");
+    assert_true(json_is_false(json_object_get(json, "ok")));
+    assert_int_equal(json_array_size(errors), 1);
+    json_t *error = json_array_get(errors, 0);
+    assert_string_equal(json_string_value(json_object_get(error, "code")), "RL_E_CONFIG");
+    assert_string_equal(json_string_value(json_object_get(error, "file")), "--set graph.sss.tapps=3");
+    assert_int_equal(json_integer_value(json_object_get(error, "line")), 1);
+    assert_non_null(strstr(json_string_value(json_object_get(error, "text")), "did you mean 'taps'?"));
+    json_decref(json);
+    tool_result_free(&r);
+    r = RUN("check", "gone.yaml", "--json");
+    expect(&r, 2);
+    assert_non_null(strstr(r.out, "\"ok\":false,\"captures\":[]"));
+    tool_result_free(&r);
+    leave(folder, pipe);
+}
+
+/* --trace is an option that run, ab, check and plan share. */
+static void test_check_trace(void **state)
+{
+    (void)state;
+    char *pipe, *folder = enter(&pipe), *path = path_in(folder, "t.json");
+    tool_result r = RUN("check", pipe, "--capture", capture, "--frames", "1-3", "--trace", path);
+    expect(&r, 0);
+    tool_result_free(&r);
+    json_t *json = json_load_file(path, 0, NULL), *event;
+    size_t i, headers = 0, others = 0;
+    json_array_foreach(json_object_get(json, "traceEvents"), i, event)
+    {
+        const char *name = json_string_value(json_object_get(event, "name"));
+        headers += !strcmp(name, "header");
+        others += !strcmp(name, "open") || !strcmp(name, "compile");
+    }
+    assert_int_equal(headers, 3);
+    assert_int_equal(others, 2);
+    json_decref(json);
+    free(path);
     leave(folder, pipe);
 }
 
@@ -552,7 +619,61 @@ static void test_inspect(void **state)
     r = RUN("inspect", folder); /* neither a capture nor an EXR */
     expect(&r, 2);
     tool_result_free(&r);
+    r = RUN("init", folder);
+    expect(&r, 2);
+    assert_non_null(strstr(r.err, "the folder holds no capture.yaml (`relit inspect "));
+    tool_result_free(&r);
+    r = RUN("check", folder);
+    expect(&r, 2);
+    assert_non_null(strstr(r.err, "this is a folder, not a pipeline (`relit init` prints"));
+    tool_result_free(&r);
+    r = RUN("check", file);
+    expect(&r, 2);
+    assert_non_null(strstr(r.err, "this is an OpenEXR file, not YAML (`relit init` prints"));
+    tool_result_free(&r);
     free(file);
+    folder_remove(folder);
+}
+
+/* Channels that no preset knows: the manifest has gaps, which are filled in by hand. */
+static void test_inspect_gaps(void **state)
+{
+    (void)state;
+    static const char *const names[] = {"albedo.R", "albedo.G", "albedo.B", "N.x",
+                                        "N.y",      "N.z",      "depth.Z",  "mat"};
+    static float plane[64];
+    rl_exr_source channels[8];
+    for (int i = 0; i < 8; i++)
+        channels[i] = (rl_exr_source){.name = names[i], .type = RL_EXR_FLOAT, .floats = plane, .stride = 8};
+    rl_exr_image image = {.data_window = {0, 0, 7, 7},
+                          .display_window = {0, 0, 7, 7},
+                          .channels = channels,
+                          .n_channels = 8,
+                          .compression = RL_EXR_ZIP};
+    char *folder = folder_new(), *file = path_in(folder, "odd.0001.exr"),
+         *yaml = path_in(folder, "capture.yaml");
+    rl_error err = {0};
+    assert_int_equal(rl_exr_write(file, &image, NULL, NULL, &err), RL_OK);
+    tool_result r = RUN("inspect", file), again;
+    expect(&r, 0);
+    char *guess = strstr(r.out, "# no preset finds all that relit needs: normal, stencil missing in 'relit'");
+    assert_non_null(guess);
+    assert_non_null(
+        strstr(guess, "  albedo: {channels: [albedo.R, albedo.G, albedo.B], colorspace: lin_rec709}\n"));
+    assert_non_null(strstr(guess, "  depth: {channels: [depth.Z], kind: planar, empty: 1e10}\n"));
+    char *normal = text_replace(guess, "#normal: {channels: [?, ?, ?]", "normal: {channels: [N.x, N.y, N.z]");
+    char *whole = text_replace(normal, "#stencil: {channels: [?]}", "stencil: {channels: [mat]}");
+    file_write(folder, "capture.yaml", whole, strlen(whole));
+    again = RUN("inspect", yaml);
+    expect(&again, 0);
+    assert_non_null(
+        strstr(again.out, "normal: {channels: [N.x, N.y, N.z], space: world, encoding: signed}\n"));
+    tool_result_free(&again);
+    tool_result_free(&r);
+    free(whole);
+    free(normal);
+    free(file);
+    free(yaml);
     folder_remove(folder);
 }
 
@@ -725,12 +846,15 @@ int main(int argc, char **argv)
         cmocka_unit_test(test_run_json_failure),
         cmocka_unit_test(test_signals),
         cmocka_unit_test(test_check_writes_nothing),
+        cmocka_unit_test(test_check_json_failure),
+        cmocka_unit_test(test_check_trace),
         cmocka_unit_test(test_check_opens_every_header),
         cmocka_unit_test(test_plan),
         cmocka_unit_test(test_plan_svg),
         cmocka_unit_test(test_init),
         cmocka_unit_test(test_init_uncommented),
         cmocka_unit_test(test_inspect),
+        cmocka_unit_test(test_inspect_gaps),
         cmocka_unit_test(test_inspect_folder),
         cmocka_unit_test(test_passes),
         cmocka_unit_test(test_kernel_example),

@@ -10,6 +10,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 
 #include "graph/base/alloc.h"
 
@@ -213,6 +214,21 @@ static size_t distance(const char *a, const char *b)
     return d[na][nb];
 }
 
+/* The only candidate that begins as `name` does, which has at least three letters ("lamb" for "lambert"). */
+static const char *completed(const char *name, const char *const *candidates, size_t n)
+{
+    const char *found = NULL;
+    size_t length = strlen(name);
+    for (size_t i = 0; i < n && length >= 3; i++) {
+        if (strncasecmp(candidates[i], name, length))
+            continue;
+        if (found)
+            return NULL;
+        found = candidates[i];
+    }
+    return found;
+}
+
 const char *rl_nearest(const char *name, const char *const *candidates, size_t n)
 {
     const char *best = NULL;
@@ -225,7 +241,7 @@ const char *rl_nearest(const char *name, const char *const *candidates, size_t n
             best = candidates[i];
         }
     }
-    return best;
+    return best ? best : completed(name, candidates, n);
 }
 
 static int by_name(const void *a, const void *b)

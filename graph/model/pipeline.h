@@ -74,6 +74,12 @@ typedef struct rl_pipeline {
     size_t n_outputs;
 } rl_pipeline;
 
+/* --set on the tree of a pipeline: rl_value_set, and what removing (null) means here. Of lights that no file
+ * of the pipeline lists it removes the capture's, by a null that stays in the implied map until the two are
+ * merged. A path that leads to nothing is a warning with the nearest name (log may be NULL). */
+rl_code rl_pipeline_set(rl_arena *arena, rl_value **root, const char *path, rl_value *v, const rl_log *log,
+                        rl_error *err);
+
 /* Parses a merged tree. User kernels (`pass: kernel`) become descriptors in the arena; their .cl file is read
  * here. Unknown keys, passes, parameters, ports: an error with the nearest name. Does not look at image names
  * (graph.h). */

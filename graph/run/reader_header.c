@@ -21,27 +21,73 @@ static rl_code missing_channel(const rl_layer *layer, const rl_exr *file, const 
     return code;
 }
 
-/* The part that holds all channels of a layer. */
+static rl_code missing_part(const rl_layer *layer, const rl_exr *file, rl_error *err)
+{
+    enum { MOST = 64 };
+    const char *names[MOST];
+    rl_str text = {0};
+    int n = 0;
+    for (; n < rl_exr_parts(file) && n < MOST; n++)
+        names[n] = rl_exr_part_at(file, n)->name;
+    rl_suggest(&text, layer->part, names, (size_t)n, "the file has");
+    rl_code code = rl_fail_file(err, RL_E_FORMAT, rl_exr_path(file),
+                                "layer '%s' needs part '%s'%s (set layers.%s in capture.yaml)", layer->name,
+                                layer->part, rl_str_text(&text), layer->name);
+    rl_str_free(&text);
+    return code;
+}
+
+/* How many of a layer's channels a part has before the first that it lacks. */
+static int channels_found(const rl_layer *layer, const rl_exr_part *part)
+{
+    int have = 0;
+    while (have < layer->n_channels && rl_exr_channel_named(part, layer->channels[have]))
+        have++;
+    return have;
+}
+
+/* The part that holds all channels of a layer. Where several do, which one is meant is not for relit to
+ * guess: "R" is the red of a part's colour and the roughness of another. */
 rl_code rl_reader_find_part(const rl_layer *layer, const rl_exr *file, int *out, rl_error *err)
 {
-    int first = layer->part ? rl_exr_part_named(file, layer->part) : 0;
+    int first = layer->part ? rl_exr_part_named(file, layer->part) : 0, found = -1;
     if (first < 0)
-        return rl_fail_file(err, RL_E_FORMAT, rl_exr_path(file),
-                            "layer '%s' needs part '%s', which the file does not have", layer->name,
-                            layer->part);
+        return missing_part(layer, file, err);
     const char *missing = layer->channels[0];
     for (int p = first; p < (layer->part ? first + 1 : rl_exr_parts(file)); p++) {
-        int have = 0;
-        for (; have < layer->n_channels; have++)
-            if (!rl_exr_channel_named(rl_exr_part_at(file, p), layer->channels[have]))
-                break;
-        if (have == layer->n_channels) {
-            *out = p;
-            return RL_OK;
-        }
-        missing = have > 0 ? layer->channels[have] : missing;
+        int have = channels_found(layer, rl_exr_part_at(file, p));
+        if (have == layer->n_channels && found >= 0)
+            return rl_fail_file(err, RL_E_FORMAT, rl_exr_path(file),
+                                "layer '%s': channel '%s' is in the parts '%s' and '%s' (set "
+                                "layers.%s.part in capture.yaml)",
+                                layer->name, layer->channels[0], rl_exr_part_at(file, found)->name,
+                                rl_exr_part_at(file, p)->name, layer->name);
+        if (have == layer->n_channels)
+            found = p;
+        else
+            missing = have > 0 ? layer->channels[have] : missing;
     }
-    return missing_channel(layer, file, missing, err);
+    *out = found;
+    return found >= 0 ? RL_OK : missing_channel(layer, file, missing, err);
+}
+
+/* What the header says already about pixels that cannot be read. */
+static rl_code check_readable(const rl_layer *layer, const rl_exr *file, int index, rl_error *err)
+{
+    const rl_exr_part *part = rl_exr_part_at(file, index);
+    if (part->deep)
+        return rl_fail_file(err, RL_E_FORMAT, rl_exr_path(file),
+                            "layer '%s' is in deep data, which relit does not read: flatten it first",
+                            layer->name);
+    for (int i = 0; i < layer->n_channels; i++) {
+        const rl_exr_channel *c = rl_exr_channel_named(part, layer->channels[i]);
+        if (c->x_sampling != 1 || c->y_sampling != 1)
+            return rl_fail_file(err, RL_E_FORMAT, rl_exr_path(file),
+                                "layer '%s': channel '%s' has a sample every %d x %d pixels; relit needs one "
+                                "in each",
+                                layer->name, c->name, c->x_sampling, c->y_sampling);
+    }
+    return RL_OK;
 }
 
 /* ---- headers ---------------------------------------------------------------------------------------------
@@ -126,6 +172,8 @@ static rl_code check_layers(rl_reader *r, rl_frame *f, rl_error *err)
         const rl_exr *file = f->files[layer->pattern];
         int part = 0;
         rl_code code = rl_reader_find_part(layer, file, &part, err);
+        if (!code)
+            code = check_readable(layer, file, part, err);
         if (code)
             return code;
         rl_exr_box w = rl_exr_part_at(file, part)->data_window;

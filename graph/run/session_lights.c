@@ -148,6 +148,27 @@ static rl_code add_light(const rl_session *s, rl_sequence *q, const rl_light_spe
     return code;
 }
 
+/* A null in changes to the capture's lights that finds none of its name there. */
+static void warn_nothing(const rl_session *s, const rl_value *lights, const rl_manifest *m)
+{
+    const rl_value *written = m->lights_written;
+    const char *names[64];
+    size_t n = 0;
+    for (; written && n < written->n && n < 64; n++)
+        names[n] = written->entries[n].key;
+    for (size_t i = 0; i < lights->n; i++) {
+        const rl_entry *e = &lights->entries[i];
+        rl_str text = {0};
+        if (e->value->kind != RL_NULL || rl_value_get(written, e->key))
+            continue;
+        rl_suggest(&text, e->key, names, n, "known");
+        rl_report(s->log, RL_WARNING, e->value->where,
+                  "nothing is removed: the capture '%s' has no light '%s'%s", m->name, e->key,
+                  rl_str_text(&text));
+        rl_str_free(&text);
+    }
+}
+
 /* The pipeline's lights, else the capture's. Paths into lights that no file of the pipeline lists
  * (`--set lights.key.exposure=1`) change the capture's. */
 static rl_code choose_lights(rl_session *s, const rl_manifest *m, rl_lights *out, rl_error *err)
@@ -156,7 +177,8 @@ static rl_code choose_lights(rl_session *s, const rl_manifest *m, rl_lights *out
     *out = m->lights;
     if (!lights)
         return RL_OK;
-    if (lights->implied && m->lights_written) {
+    if (lights->implied) { /* nulls in it remove */
+        warn_nothing(s, lights, m);
         lights = rl_value_merge(&s->arena, m->lights_written, (rl_value *)lights);
         if (!lights)
             return rl_fail_memory(err, sizeof *lights);
