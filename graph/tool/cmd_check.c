@@ -1,10 +1,9 @@
 /* `relit check`: all that can be known without a pixel. Besides what opening a session checks, it opens every
  * frame's files, so that a hole in a sequence is found before the night's run. */
-#include <jansson.h>
-#include <stdlib.h>
 #include <time.h>
 
 #include "graph/run/session.h"
+#include "graph/tool/json_print.h"
 #include "graph/tool/outdir.h"
 #include "graph/tool/tool.h"
 #include "graph/tool/trace.h"
@@ -68,15 +67,9 @@ static void print_json(const checker *c, const rl_error *err, rl_str *out)
     }
     if (err->code)
         json_array_append_new(c->errors, rl_report_error_json(err));
-    json_t *object = json_pack("{s:s, s:b, s:o, s:O}", "pipeline", c->tool->args.run.pipeline, "ok",
-                               json_array_size(c->errors) == 0, "captures", captures, "errors", c->errors);
-    char *text = object ? json_dumps(object, JSON_COMPACT) : NULL;
-    if (text)
-        rl_str_printf(out, "%s\n", text);
-    else
-        out->failed = true;
-    free(text);
-    json_decref(object);
+    rl_json_print(json_pack("{s:s, s:b, s:o, s:O}", "pipeline", c->tool->args.run.pipeline, "ok",
+                            json_array_size(c->errors) == 0, "captures", captures, "errors", c->errors),
+                  JSON_COMPACT, out);
 }
 
 static void report_bad(const checker *c, const rl_error *err)
