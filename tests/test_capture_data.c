@@ -132,11 +132,11 @@ static void test_counts(void **state)
         assert_int_equal(o.summary.nonfinite, 10);
         assert_int_equal(o.summary.clamped, 6);
         /* which layer it was, once */
-        const char *said = strstr(capture_log(), "layer 'albedo': 3 samples of frame 1 are NaN or infinite");
+        const char *said = strstr(capture_log(), "layer 'albedo': 3 NaN or infinite samples in frame 1");
         assert_non_null(said);
         assert_null(strstr(said + 1, "layer 'albedo'"));
-        assert_non_null(strstr(capture_log(), "layer 'normal': 1 sample of frame 1 is NaN or infinite"));
-        assert_non_null(strstr(capture_log(), "layer 'depth': 1 sample of frame 1 is NaN or infinite"));
+        assert_non_null(strstr(capture_log(), "layer 'normal': 1 NaN or infinite sample in frame 1"));
+        assert_non_null(strstr(capture_log(), "layer 'depth': 1 NaN or infinite sample in frame 1"));
         sequence_leave(folder, s, 2);
     }
 }

@@ -65,9 +65,8 @@ void rl_reader_count_nonfinite(rl_reader *r, rl_frame *f, int binding, uint64_t 
     b->said_nonfinite = true;
     rl_report(
         r->setup.log, RL_WARNING, (rl_where){.file = file},
-        "layer '%s': %llu sample%s of frame %d NaN or infinite and taken for 0 (other frames are counted "
-        "only)",
-        b->layer->name, (unsigned long long)count, count == 1 ? " is" : "s are", f->number);
+        "layer '%s': %llu NaN or infinite sample%s in frame %d, taken for 0; later frames are only counted",
+        b->layer->name, (unsigned long long)count, count == 1 ? "" : "s", f->number);
 }
 
 static void convert_group(void *ctx, int part, int y0, int y1)
