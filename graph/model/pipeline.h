@@ -14,7 +14,7 @@ extern "C" {
 
 typedef struct rl_node_input {
     const char *port;
-    const char *image; /* as written: "light.diffuse", "capture.normal", "capture.shadow.key" */
+    const char *image; /* as written: "light.diffuse", "capture.normal", "capture.shadow.key", "none" */
     rl_where where;    /* of the image's name */
 } rl_node_input;
 

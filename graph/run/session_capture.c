@@ -181,7 +181,8 @@ static void note_absent(const rl_session *s, const rl_sequence *q)
         const rl_graph_node *node = &q->graph->nodes[q->plan->nodes[i].node];
         for (size_t p = 0; p < node->pass->ports.n; p++) {
             const rl_port *port = &node->pass->ports.rows[p];
-            if (port->if_absent && node->images[p] < 0)
+            bool left_out = rl_manifest_layer(q->manifest, port->name); /* `none`: no news */
+            if (port->if_absent && node->images[p] < 0 && !left_out)
                 rl_report(s->log, RL_NOTE, node->where, "pass '%s' (%s): capture '%s' has no layer '%s': %s",
                           node->name, node->pass->name, q->manifest->name, port->name, port->if_absent);
         }
