@@ -729,7 +729,14 @@ static void test_passes(void **state)
     expect(&json, 0);
     json_t *list = json_loads(json.out, 0, NULL);
     assert_true(json_is_array(list));
-    assert_int_equal(json_array_size(list), rl_pass_count());
+    assert_int_equal(json_array_size(list), rl_pass_count() + 1); /* and the user's own */
+    tool_result own = RUN("passes", "kernel", "--json");
+    expect(&own, 0);
+    json_t *kernel = json_loads(own.out, 0, NULL);
+    assert_string_equal(json_string_value(json_object_get(kernel, "name")), "kernel");
+    assert_true(json_equal(kernel, json_array_get(list, rl_pass_count())));
+    json_decref(kernel);
+    tool_result_free(&own);
     for (size_t i = 0; i < rl_pass_count(); i++) {
         const rl_pass *pass = rl_pass_at(i);
         tool_result r = RUN("passes", pass->name);
