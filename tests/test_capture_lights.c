@@ -136,6 +136,30 @@ static void test_removing_nothing(void **state)
     capture_log_clear();
 }
 
+/* Neither has any: a black picture is not what was meant. An empty map says that it is. */
+static void test_no_light(void **state)
+{
+    (void)state;
+    static const rl_setting none = {"lights", "{}"};
+    const capture_form f = {.name = "no lights", .no_lights = true};
+    scene s = truth(0, 0);
+    char *own = folder_new();
+    capture_write(own, &f, &s, 1);
+    capture_manifest(own, &f, &s, 1);
+    for (int i = 0; i < 2; i++) {
+        const rl_options options = {.settings = &none, .n_settings = (size_t)i};
+        capture_log_clear();
+        rl_session *r = capture_open(own, capture_pipeline, &options);
+        const char *said = strstr(capture_log(), "pass 'light' (lighting): there is no light: neither the "
+                                                 "pipeline nor the capture 'cap' has `lights:`");
+        assert_int_equal(said != NULL, i == 0);
+        rl_session_close(&r);
+    }
+    capture_log_clear();
+    scene_free(&s);
+    folder_remove(own);
+}
+
 /* ---- units ---- */
 
 static void test_photometric(void **state)
@@ -434,19 +458,13 @@ static void test_memory_without_name(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_paths),
-        cmocka_unit_test(test_removing_nothing),
-        cmocka_unit_test(test_photometric),
-        cmocka_unit_test(test_sphere),
-        cmocka_unit_test(test_shadows),
-        cmocka_unit_test(test_no_such_shadow),
-        cmocka_unit_test(test_renamed_layers),
-        cmocka_unit_test(test_camera_space),
-        cmocka_unit_test(test_working_space),
-        cmocka_unit_test(test_bare),
-        cmocka_unit_test(test_preset_inline),
-        cmocka_unit_test(test_preset_blender),
-        cmocka_unit_test(test_memory_without_name),
+        cmocka_unit_test(test_paths),          cmocka_unit_test(test_removing_nothing),
+        cmocka_unit_test(test_no_light),       cmocka_unit_test(test_photometric),
+        cmocka_unit_test(test_sphere),         cmocka_unit_test(test_shadows),
+        cmocka_unit_test(test_no_such_shadow), cmocka_unit_test(test_renamed_layers),
+        cmocka_unit_test(test_camera_space),   cmocka_unit_test(test_working_space),
+        cmocka_unit_test(test_bare),           cmocka_unit_test(test_preset_inline),
+        cmocka_unit_test(test_preset_blender), cmocka_unit_test(test_memory_without_name),
     };
     return cmocka_run_group_tests(tests, setup, teardown);
 }

@@ -189,6 +189,24 @@ static void note_absent(const rl_session *s, const rl_sequence *q)
     }
 }
 
+/* A black picture that nobody asked for. Lights that are written down and off are what somebody wants. */
+static void warn_dark(const rl_session *s, const rl_sequence *q)
+{
+    if (q->n_lights || s->pipeline->lights || s->pipeline->ambient || q->manifest->lights.n)
+        return;
+    for (size_t i = 0; i < q->plan->n_nodes; i++) {
+        const rl_graph_node *node = &q->graph->nodes[q->plan->nodes[i].node];
+        for (size_t p = 0; p < node->pass->ports.n; p++)
+            if (node->pass->ports.rows[p].format == RL_LIGHTS) {
+                rl_report(s->log, RL_WARNING, node->where,
+                          "pass '%s' (%s): there is no light: neither the pipeline nor the capture '%s' has "
+                          "`lights:`",
+                          node->name, node->pass->name, q->manifest->name);
+                return;
+            }
+    }
+}
+
 /* Image files other than EXR hold grey or colours. */
 static rl_code check_formats(const rl_session *s, const rl_graph *graph, rl_error *err)
 {
@@ -225,8 +243,10 @@ static rl_code make_plan(rl_session *s, rl_sequence *q, rl_error *err)
         code = rl_graph_check_needs(&s->arena, q->graph, q->materials, err);
     if (!code)
         code = rl_plan_make(&s->arena, q->graph, &q->plan, err);
-    if (!code)
+    if (!code) {
         note_absent(s, q);
+        warn_dark(s, q);
+    }
     return code;
 }
 
