@@ -108,6 +108,7 @@ static const row rows[] = {
     {"two outputs of one file", "frame:04}.png\"", "frame:04}.exr\"", .says = {"pipe.yaml:", "beauty", "view"}},
     /* captures */
     {"missing manifest", "capture: capture.yaml", "capture: gone.yaml", .says = {"gone.yaml"}},
+    {"a pipeline for a manifest", "capture: capture.yaml", "capture: pipe.yaml", .says = {"pipe.yaml: error: this is a pipeline, not the manifest of a capture"}},
     {"missing files", "monkey.####.exr", "gone.####.exr", true, .says = {"gone."}},
     {"missing channel", "normal.X, normal.Y", "nrm.X, normal.Y", true, .says = {"monkey.0001.exr", "layer 'normal'", "'nrm.X'", "normal.X"}},
     {"missing required layer", "  depth:     {channels: [depth.Z], kind: planar, empty: 1e10}\n", "", true, .says = {"depth"}},

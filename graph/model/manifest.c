@@ -218,6 +218,9 @@ rl_code rl_manifest_load(rl_arena *arena, const char *path, const char *presets,
             "in it)",
             given);
     rl_code code = rl_config_load(arena, path, &v, err);
+    if (!code && rl_value_get(v, "relit") && !rl_value_get(v, "relit_capture"))
+        return rl_fail_file(err, RL_E_CONFIG, path,
+                            "this is a pipeline, not the manifest of a capture (its `capture:` names one)");
     return code ? code : rl_manifest_parse(arena, v, presets, log, out, err);
 }
 
