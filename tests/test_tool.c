@@ -537,6 +537,20 @@ static void test_init(void **state)
                        "#  key: {type: point, position: [-0.5, -0.52, 0.47], intensity: [2.2, 2.024, 1.804]");
     expect_init_checks(manifest, "#  skin: {scatter_distance_mm: [3.0, 1.2, 0.7]}");
     expect_init_checks(file, "id-6: {stencil: 6}"); /* no manifest: ids from the pixels */
+    /* two ids of one name are one material */
+    size_t size;
+    char *folder = folder_new(), *text = file_read(manifest, &size),
+         *files = path_in(capture, "monkey.####.exr");
+    char *here = text_replace(text, "monkey.####.exr", files),
+         *twice = text_replace(here, "6: marble", "6: wax");
+    file_write(folder, "capture.yaml", twice, strlen(twice));
+    expect_init_checks(folder,
+                       "  wax: {stencil: [4, 6]}    # {stencil: [4, 6], profile: wax}\n  eyes: {stencil: 5}");
+    free(twice);
+    free(here);
+    free(files);
+    free(text);
+    folder_remove(folder);
     free(file);
     free(manifest);
 }

@@ -214,6 +214,21 @@ static size_t distance(const char *a, const char *b)
     return d[na][nb];
 }
 
+const char *rl_nearest(const char *name, const char *const *candidates, size_t n)
+{
+    const char *best = NULL;
+    size_t length = strlen(name);
+    size_t least = (length < 3 ? 1 : (length + 2) / 3) + 1;
+    for (size_t i = 0; i < n; i++) {
+        size_t d = distance(name, candidates[i]);
+        if (d < least && d < strlen(candidates[i])) {
+            least = d;
+            best = candidates[i];
+        }
+    }
+    return best;
+}
+
 /* The only candidate that begins as `name` does, which has at least three letters ("lamb" for "lambert"). */
 static const char *completed(const char *name, const char *const *candidates, size_t n)
 {
@@ -229,21 +244,6 @@ static const char *completed(const char *name, const char *const *candidates, si
     return found;
 }
 
-const char *rl_nearest(const char *name, const char *const *candidates, size_t n)
-{
-    const char *best = NULL;
-    size_t length = strlen(name);
-    size_t least = (length < 3 ? 1 : (length + 2) / 3) + 1;
-    for (size_t i = 0; i < n; i++) {
-        size_t d = distance(name, candidates[i]);
-        if (d < least && d < strlen(candidates[i])) {
-            least = d;
-            best = candidates[i];
-        }
-    }
-    return best ? best : completed(name, candidates, n);
-}
-
 static int by_name(const void *a, const void *b)
 {
     return strcmp(*(const char *const *)a, *(const char *const *)b);
@@ -252,6 +252,7 @@ static int by_name(const void *a, const void *b)
 void rl_suggest(rl_str *s, const char *name, const char *const *candidates, size_t n, const char *what)
 {
     const char *near = rl_nearest(name, candidates, n);
+    near = near ? near : completed(name, candidates, n);
     if (near)
         rl_str_printf(s, "; did you mean '%s'?", near);
     if (!n)
