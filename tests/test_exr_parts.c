@@ -37,10 +37,10 @@ static const char manifest[] =
 static float half_grey[W * H], zero[W * H], one[W * H];
 static uint32_t ids[W * H];
 
-static void write_parts(const char *folder, bool subsampled)
+static void write_parts(const char *folder, bool subsampled, bool placed)
 {
     static const float matrix[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
-    static const made_header header = {.matrix = matrix, .fov_x = 0.6f};
+    const made_header header = {.matrix = placed ? matrix : NULL, .fov_x = 0.6f};
     const made_channel color[] = {{"B", RL_EXR_FLOAT, 0, half_grey},
                                   {"G", RL_EXR_FLOAT, 0, half_grey},
                                   {"R", RL_EXR_FLOAT, 0, half_grey}},
@@ -159,7 +159,7 @@ static tool_result look(const char *command, char *folder, const char *text)
 static tool_result look_at_parts(const char *command, const char *find, const char *put)
 {
     char *folder = folder_new(), *text = text_replace(manifest, find, put);
-    write_parts(folder, false);
+    write_parts(folder, false, true);
     tool_result r = look(command, folder, text);
     free(text);
     return r;
@@ -212,9 +212,21 @@ static void test_unreadable_pixels(void **state)
     expect_refusal(look("check", folder, deep_manifest),
                    "is in deep data, which relit does not read: flatten it first");
     folder = folder_new();
-    write_parts(folder, true);
+    write_parts(folder, true, true);
     expect_refusal(look("check", folder, manifest),
                    "layer 'roughness': channel 'R' has a sample every 2 x 2 pixels");
+}
+
+/* The manifest (or a preset) leaves the camera to the header, which has none: it is the file that lacks it.
+ */
+static void test_no_camera(void **state)
+{
+    (void)state;
+    char *folder = folder_new();
+    write_parts(folder, false, false);
+    expect_refusal(
+        look("check", folder, manifest),
+        "c.exr: error: the file has no attribute worldToCamera; give camera.matrix in the manifest");
 }
 
 int main(void)
@@ -223,6 +235,7 @@ int main(void)
         cmocka_unit_test(test_by_name),
         cmocka_unit_test(test_which_part),
         cmocka_unit_test(test_unreadable_pixels),
+        cmocka_unit_test(test_no_camera),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -626,6 +626,7 @@ static void test_inspect(void **state)
     assert_non_null(strstr(r.out, "camera:jitter (v2f): [0 -0.1666"));
     assert_non_null(strstr(r.out, "relit_capture: 1\n"));
     assert_non_null(strstr(r.out, "files: monkey.####.exr\nframes: 1-8")); /* the sequence that it is of */
+    assert_null(strstr(r.out, "no attribute"));
     tool_result_free(&r);
     r = RUN("inspect", capture);
     expect(&r, 0);
@@ -673,6 +674,8 @@ static void test_inspect_gaps(void **state)
     expect(&r, 0);
     char *guess = strstr(r.out, "# no preset finds all that relit needs: normal, stencil missing in 'relit'");
     assert_non_null(guess);
+    assert_non_null(strstr(guess, "# the file has no attribute worldToCamera: give camera.matrix"));
+    assert_non_null(strstr(guess, "# the file has no attribute camera:fovx: give camera.fov_x"));
     assert_non_null(
         strstr(guess, "  albedo: {channels: [albedo.R, albedo.G, albedo.B], colorspace: lin_rec709}\n"));
     assert_non_null(strstr(guess, "  depth: {channels: [depth.Z], kind: planar, empty: 1e10}\n"));

@@ -140,6 +140,9 @@ static rl_code read_camera(rl_reader *r, rl_frame *f, int file_number, rl_error 
     double header[16];
     float header_f[16];
     bool has = number_attr(file, f->main_part, "worldToCamera", 16, header);
+    if (!has && r->setup.manifest->camera.matrix_source == RL_SOURCE_HEADER)
+        return rl_fail_file(err, RL_E_FORMAT, rl_exr_path(file),
+                            "the file has no attribute worldToCamera; give camera.matrix in the manifest");
     for (int i = 0; i < 16 && has; i++)
         header_f[i] = (float)header[i];
     rl_camera_info c = {.display = {f->display_window.x0, f->display_window.y0,

@@ -118,6 +118,34 @@ static void print_with_gaps(const rl_manifest *m, rl_str *out)
     rl_str_free(&text);
 }
 
+static bool has_attribute(const rl_exr *file, const char *name)
+{
+    rl_exr_value v;
+    for (int p = 0; p < rl_exr_parts(file); p++)
+        if (rl_exr_attr(file, p, name, &v))
+            return true;
+    return false;
+}
+
+/* Says what a guess takes from the header that is not there, above the manifest. */
+static rl_code print_camera_gaps(rl_arena *arena, const rl_manifest *m, rl_str *out, rl_error *err)
+{
+    rl_exr *file = NULL;
+    const char *first = rl_capture_first(arena, m, 0);
+    rl_code code = first ? rl_exr_open(first, 0, &file, err) : rl_fail_memory(err, 1);
+    if (code)
+        return code;
+    if (m->camera.matrix_source == RL_SOURCE_HEADER && !has_attribute(file, "worldToCamera"))
+        rl_str_add(out,
+                   "# the file has no attribute worldToCamera: give camera.matrix, 16 numbers, rows listed, "
+                   "for column\n# vectors\n");
+    if (m->camera.fov_source == RL_SOURCE_HEADER && !has_attribute(file, "camera:fovx"))
+        rl_str_add(out, "# the file has no attribute camera:fovx: give camera.fov_x, in degrees, if its "
+                        "screenWindowWidth is not\n# the true one\n");
+    rl_exr_close(&file);
+    return RL_OK;
+}
+
 /* A guessed manifest is to be saved beside the files: their names in it are without a folder. */
 static rl_code print_guess(rl_arena *arena, const rl_capture *capture, rl_str *out, rl_error *err)
 {
@@ -143,8 +171,9 @@ static rl_code print_guess(rl_arena *arena, const rl_capture *capture, rl_str *o
         rl_str_printf(out,
                       "# guessed by preset '%s': check units and spaces, then save it as %s/capture.yaml\n",
                       capture->preset, folder);
+    rl_code code = print_camera_gaps(arena, capture->manifest, out, err);
     print_with_gaps(&m, out);
-    return RL_OK;
+    return code;
 }
 
 static rl_code print_mapping(rl_arena *arena, const rl_capture *capture, rl_str *out, rl_error *err)
