@@ -37,10 +37,11 @@ static const char manifest[] =
 static float half_grey[W * H], zero[W * H], one[W * H];
 static uint32_t ids[W * H];
 
-static void write_parts(const char *folder, bool subsampled, bool placed)
+/* `placed`: how many of the parts, from the first, say where the camera is. */
+static void write_parts(const char *folder, bool subsampled, int placed)
 {
     static const float matrix[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
-    const made_header header = {.matrix = placed ? matrix : NULL, .fov_x = 0.6f};
+    static const made_header with = {.matrix = matrix, .fov_x = 0.6f}, without = {.fov_x = 0.6f};
     const made_channel color[] = {{"B", RL_EXR_FLOAT, 0, half_grey},
                                   {"G", RL_EXR_FLOAT, 0, half_grey},
                                   {"R", RL_EXR_FLOAT, 0, half_grey}},
@@ -57,7 +58,7 @@ static void write_parts(const char *folder, bool subsampled, bool placed)
     for (int i = 0; i < 5; i++) {
         parts[i].width = W;
         parts[i].height = H;
-        parts[i].header = &header;
+        parts[i].header = i < placed ? &with : &without;
     }
     for (int i = 0; i < W * H; i++) {
         half_grey[i] = 0.5f;
@@ -159,7 +160,7 @@ static tool_result look(const char *command, char *folder, const char *text)
 static tool_result look_at_parts(const char *command, const char *find, const char *put)
 {
     char *folder = folder_new(), *text = text_replace(manifest, find, put);
-    write_parts(folder, false, true);
+    write_parts(folder, false, 5);
     tool_result r = look(command, folder, text);
     free(text);
     return r;
@@ -212,7 +213,7 @@ static void test_unreadable_pixels(void **state)
     expect_refusal(look("check", folder, deep_manifest),
                    "is in deep data, which relit does not read: flatten it first");
     folder = folder_new();
-    write_parts(folder, true, true);
+    write_parts(folder, true, 5);
     expect_refusal(look("check", folder, manifest),
                    "layer 'roughness': channel 'R' has a sample every 2 x 2 pixels");
 }
@@ -223,7 +224,7 @@ static void test_no_camera(void **state)
 {
     (void)state;
     char *folder = folder_new();
-    write_parts(folder, false, false);
+    write_parts(folder, false, 0);
     expect_refusal(
         look("check", folder, manifest),
         "c.exr: error: the file has no attribute worldToCamera; give camera.matrix in the manifest");

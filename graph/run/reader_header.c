@@ -102,6 +102,19 @@ static bool number_attr(const rl_exr *file, int part, const char *name, int n, d
     return true;
 }
 
+/* Of the part that holds the depth, else of any part of the frame's files: some writers put what is common to
+ * all parts into the first alone. */
+static bool camera_attr(const rl_frame *f, const char *name, int n, double *out)
+{
+    if (number_attr(f->files[f->main_file], f->main_part, name, n, out))
+        return true;
+    for (int i = 0; i < RL_MOST_FILES; i++)
+        for (int p = 0; f->files[i] && p < rl_exr_parts(f->files[i]); p++)
+            if (number_attr(f->files[i], p, name, n, out))
+                return true;
+    return false;
+}
+
 static void read_lens(rl_reader *r, const rl_frame *f, int file_number, rl_camera_info *c)
 {
     const rl_exr *file = f->files[f->main_file];
@@ -114,7 +127,7 @@ static void read_lens(rl_reader *r, const rl_frame *f, int file_number, rl_camer
     c->pixel_aspect = (double)part->pixel_aspect;
     if (fov) {
         c->fov_x = *fov;
-    } else if (!number_attr(file, f->main_part, "camera:fovx", 1, &c->fov_x) && !r->said_window) {
+    } else if (!camera_attr(f, "camera:fovx", 1, &c->fov_x) && !r->said_window) {
         r->said_window = true;
         rl_report(
             r->setup.log, c->screen_width == 1 ? RL_WARNING : RL_VERBOSE,
@@ -127,7 +140,7 @@ static void read_lens(rl_reader *r, const rl_frame *f, int file_number, rl_camer
     }
     if (jitter) {
         memcpy(c->jitter, jitter, sizeof c->jitter);
-    } else if (!number_attr(file, f->main_part, "camera:jitter", 2, c->jitter) && !r->said_jitter) {
+    } else if (!camera_attr(f, "camera:jitter", 2, c->jitter) && !r->said_jitter) {
         r->said_jitter = true;
         rl_report(r->setup.log, RL_VERBOSE, (rl_where){.file = rl_exr_path(file)},
                   "no attribute camera:jitter: samples lie at the pixels' centres");
@@ -139,7 +152,7 @@ static rl_code read_camera(rl_reader *r, rl_frame *f, int file_number, rl_error 
     const rl_exr *file = f->files[f->main_file];
     double header[16];
     float header_f[16];
-    bool has = number_attr(file, f->main_part, "worldToCamera", 16, header);
+    bool has = camera_attr(f, "worldToCamera", 16, header);
     if (!has && r->setup.manifest->camera.matrix_source == RL_SOURCE_HEADER)
         return rl_fail_file(err, RL_E_FORMAT, rl_exr_path(file),
                             "the file has no attribute worldToCamera; give camera.matrix in the manifest");
