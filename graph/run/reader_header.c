@@ -47,28 +47,32 @@ static int channels_found(const rl_layer *layer, const rl_exr_part *part)
 }
 
 /* The part that holds all channels of a layer. Where several do, which one is meant is not for relit to
- * guess: "R" is the red of a part's colour and the roughness of another. */
+ * guess: "R" is the red of a part's colour and the roughness of another. Deep ones count where there is no
+ * other. */
 rl_code rl_reader_find_part(const rl_layer *layer, const rl_exr *file, int *out, rl_error *err)
 {
-    int first = layer->part ? rl_exr_part_named(file, layer->part) : 0, found = -1;
+    int first = layer->part ? rl_exr_part_named(file, layer->part) : 0, found = -1, deep = -1;
     if (first < 0)
         return missing_part(layer, file, err);
     const char *missing = layer->channels[0];
     for (int p = first; p < (layer->part ? first + 1 : rl_exr_parts(file)); p++) {
-        int have = channels_found(layer, rl_exr_part_at(file, p));
-        if (have == layer->n_channels && found >= 0)
+        const rl_exr_part *part = rl_exr_part_at(file, p);
+        int have = channels_found(layer, part);
+        if (have < layer->n_channels)
+            missing = have > 0 ? layer->channels[have] : missing;
+        else if (part->deep)
+            deep = p;
+        else if (found < 0)
+            found = p;
+        else
             return rl_fail_file(err, RL_E_FORMAT, rl_exr_path(file),
                                 "layer '%s': channel '%s' is in the parts '%s' and '%s' (set "
                                 "layers.%s.part in capture.yaml)",
                                 layer->name, layer->channels[0], rl_exr_part_at(file, found)->name,
-                                rl_exr_part_at(file, p)->name, layer->name);
-        if (have == layer->n_channels)
-            found = p;
-        else
-            missing = have > 0 ? layer->channels[have] : missing;
+                                part->name, layer->name);
     }
-    *out = found;
-    return found >= 0 ? RL_OK : missing_channel(layer, file, missing, err);
+    *out = found >= 0 ? found : deep;
+    return *out >= 0 ? RL_OK : missing_channel(layer, file, missing, err);
 }
 
 /* What the header says already about pixels that cannot be read. */
