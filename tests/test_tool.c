@@ -422,6 +422,49 @@ static void test_check_json_failure(void **state)
     leave(folder, pipe);
 }
 
+/* A profile that lets light through, and a capture that does not say how thick things are. */
+static void test_check_missed_layers(void **state)
+{
+    (void)state;
+    size_t size;
+    char *pipe, *folder = enter(&pipe), *manifest = path_in(capture, "capture.yaml");
+    char *files = path_in(capture, "monkey.####.exr"), *text = file_read(manifest, &size);
+    char *here = text_replace(text, "monkey.####.exr", files);
+    char *some = text_replace(here, "  thickness: {channels: [thickness.T]}\n", "");
+    char *none = text_replace(some,
+                              "  shadow_thickness: {key: shadow_thickness.key, rim: shadow_thickness.rim, "
+                              "fill: shadow_thickness.fill}\n",
+                              "");
+    const struct {
+        const char *manifest, *set;
+        bool noted;
+    } rows[] = {{none, "profiles.skin.transmission=thick", true},
+                {none, "profiles.skin.transmission=none", false},
+                {some, "profiles.skin.transmission=thick", false}};
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        file_write(folder, "capture.yaml", rows[i].manifest, strlen(rows[i].manifest));
+        tool_result r = RUN("check", pipe, "--capture", folder, "--set", rows[i].set);
+        expect(&r, 0);
+        const char *said = strstr(r.err, "note: pass 'light' (lighting): the profile of material 'skin' has "
+                                         "'transmission: thick', but there is no 'thickness' and no "
+                                         "'shadow_thickness': no light comes through");
+        assert_int_equal(said != NULL, rows[i].noted);
+        tool_result_free(&r);
+        r = RUN("check", pipe, "--capture", folder, "--set", rows[i].set, "--set",
+                "shading.transmission=false");
+        expect(&r, 0);
+        assert_string_equal(r.err, "");
+        tool_result_free(&r);
+    }
+    free(none);
+    free(some);
+    free(here);
+    free(text);
+    free(files);
+    free(manifest);
+    leave(folder, pipe);
+}
+
 /* --trace is an option that run, ab, check and plan share. */
 static void test_check_trace(void **state)
 {
@@ -862,6 +905,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(test_signals),
         cmocka_unit_test(test_check_writes_nothing),
         cmocka_unit_test(test_check_json_failure),
+        cmocka_unit_test(test_check_missed_layers),
         cmocka_unit_test(test_check_trace),
         cmocka_unit_test(test_check_opens_every_header),
         cmocka_unit_test(test_plan),

@@ -174,39 +174,6 @@ static rl_code list_layers(rl_session *s, const rl_sequence *q, rl_layer_info **
     return RL_OK;
 }
 
-/* Says, once a capture, what passes do without an input that they would like to have. */
-static void note_absent(const rl_session *s, const rl_sequence *q)
-{
-    for (size_t i = 0; i < q->plan->n_nodes; i++) {
-        const rl_graph_node *node = &q->graph->nodes[q->plan->nodes[i].node];
-        for (size_t p = 0; p < node->pass->ports.n; p++) {
-            const rl_port *port = &node->pass->ports.rows[p];
-            bool left_out = rl_manifest_layer(q->manifest, port->name); /* `none`: no news */
-            if (port->if_absent && node->images[p] < 0 && !left_out)
-                rl_report(s->log, RL_NOTE, node->where, "pass '%s' (%s): capture '%s' has no layer '%s': %s",
-                          node->name, node->pass->name, q->manifest->name, port->name, port->if_absent);
-        }
-    }
-}
-
-/* A black picture that nobody asked for. Lights that are written down and off are what somebody wants. */
-static void warn_dark(const rl_session *s, const rl_sequence *q)
-{
-    if (q->n_lights || s->pipeline->lights || s->pipeline->ambient || q->manifest->lights.n)
-        return;
-    for (size_t i = 0; i < q->plan->n_nodes; i++) {
-        const rl_graph_node *node = &q->graph->nodes[q->plan->nodes[i].node];
-        for (size_t p = 0; p < node->pass->ports.n; p++)
-            if (node->pass->ports.rows[p].format == RL_LIGHTS) {
-                rl_report(s->log, RL_WARNING, node->where,
-                          "pass '%s' (%s): there is no light: neither the pipeline nor the capture '%s' has "
-                          "`lights:`",
-                          node->name, node->pass->name, q->manifest->name);
-                return;
-            }
-    }
-}
-
 /* Image files other than EXR hold grey or colours. */
 static rl_code check_formats(const rl_session *s, const rl_graph *graph, rl_error *err)
 {
@@ -243,10 +210,8 @@ static rl_code make_plan(rl_session *s, rl_sequence *q, rl_error *err)
         code = rl_graph_check_needs(&s->arena, q->graph, q->materials, err);
     if (!code)
         code = rl_plan_make(&s->arena, q->graph, &q->plan, err);
-    if (!code) {
-        note_absent(s, q);
-        warn_dark(s, q);
-    }
+    if (!code)
+        rl_session_note_absent(s, q);
     return code;
 }
 
