@@ -157,7 +157,8 @@ static rl_code read_depth(const layer_reader *l)
     if (!code && word == RL_DEPTH_DEVICE)
         code = read_device(l);
     if (!code && empty)
-        code = rl_value_number(empty, "empty", -INFINITY, INFINITY, &l->layer->empty, err);
+        code = rl_value_number(empty, "empty", word == RL_DEPTH_DEVICE ? -INFINITY : DBL_MIN, INFINITY,
+                               &l->layer->empty, err);
     return code;
 }
 

@@ -258,7 +258,6 @@ typedef struct setting {
     const char *path; /* the whole */
     rl_value *v;
     rl_error *err;
-    bool patch; /* a null that finds nothing to remove stays, for rl_value_merge */
 } setting;
 
 static rl_code set_at(const setting *s, rl_value **at, const char *rest);
@@ -284,9 +283,9 @@ static rl_code set_in_map(const setting *s, rl_value *map, const char *rest, siz
 {
     rl_entry *e = (rl_entry *)find_n(map, rest, length);
     bool last = !rest[length];
-    if (s->v->kind == RL_NULL && !e && !s->patch)
+    if (s->v->kind == RL_NULL && !e)
         return RL_OK;
-    if (s->v->kind == RL_NULL && e && last && !s->patch) {
+    if (s->v->kind == RL_NULL && last) {
         remove_entry(map, e);
         return RL_OK;
     }
@@ -324,29 +323,17 @@ static rl_code set_at(const setting *s, rl_value **at, const char *rest)
     return code;
 }
 
-static rl_code set_path(const setting *s, rl_value **root)
+rl_code rl_value_set(rl_arena *arena, rl_value **root, const char *path, rl_value *v, rl_error *err)
 {
     enum { DEEPEST = 32 }; /* far beyond any schema; keeps recursion over trees bounded */
-    const char *path = s->path;
     int depth = 1;
     for (const char *p = path; *p; p++)
         depth += *p == '.';
     size_t n = strlen(path);
     if (!n || path[0] == '.' || path[n - 1] == '.' || strstr(path, ".."))
-        return rl_fail(s->err, RL_E_USAGE, s->v->where, "'%s' is no dotted path, such as graph.sss.taps",
-                       path);
+        return rl_fail(err, RL_E_USAGE, v->where, "'%s' is no dotted path, such as graph.sss.taps", path);
     if (depth > DEEPEST)
-        return rl_fail(s->err, RL_E_USAGE, s->v->where, "the path has %d parts; the most is %d", depth,
-                       DEEPEST);
-    return set_at(s, root, path);
-}
-
-rl_code rl_value_set(rl_arena *arena, rl_value **root, const char *path, rl_value *v, rl_error *err)
-{
-    return set_path(&(setting){.arena = arena, .path = path, .v = v, .err = err}, root);
-}
-
-rl_code rl_value_patch(rl_arena *arena, rl_value **root, const char *path, rl_value *v, rl_error *err)
-{
-    return set_path(&(setting){.arena = arena, .path = path, .v = v, .err = err, .patch = true}, root);
+        return rl_fail(err, RL_E_USAGE, v->where, "the path has %d parts; the most is %d", depth, DEEPEST);
+    setting s = {.arena = arena, .path = path, .v = v, .err = err};
+    return set_at(&s, root, path);
 }

@@ -77,8 +77,6 @@ rl_value *rl_value_merge(rl_arena *arena, rl_value *base, rl_value *over);
 /* --set: puts v at a dotted path of *root, creating maps on the way; RL_NULL removes. List elements can be
  * replaced by index, not added. `where` names the option in errors. */
 rl_code rl_value_set(rl_arena *arena, rl_value **root, const char *path, rl_value *v, rl_error *err);
-/* The same in a tree that rl_value_merge lays over another: a null stays in it, and removes there. */
-rl_code rl_value_patch(rl_arena *arena, rl_value **root, const char *path, rl_value *v, rl_error *err);
 
 /* ---- checked reading of maps, for every parser of a config (value.c) ---- */
 

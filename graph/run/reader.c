@@ -39,8 +39,8 @@ static rl_code add_binding(rl_reader *r, const rl_layer *layer, int buffer, int 
     b.is_stencil = layer->id == RL_LAYER_STENCIL;
     if (layer->colorspace && strcmp(layer->colorspace, r->setup.working)) {
         const char *from;
-        rl_ocio_request request = {.from = layer->colorspace, .to = r->setup.working};
         rl_code code = rl_color_space(r->setup.ocio, layer->colorspace, layer->colorspace_where, &from, err);
+        rl_ocio_request request = {.from = from, .to = r->setup.working};
         if (!code && strcmp(from, r->setup.working))
             code = rl_ocio_transform_new(r->setup.ocio, &request, &b.to_working, err);
         if (code)
