@@ -2,6 +2,7 @@
 #include <string.h>
 
 #include "graph/run/camera.h"
+#include "graph/run/camera_header.h"
 #include "graph/run/reader_parts.h"
 
 static rl_code missing_channel(const rl_layer *layer, const rl_exr *file, const char *channel, rl_error *err)
@@ -60,23 +61,24 @@ static void read_lens(rl_reader *r, const rl_frame *f, int file_number, rl_camer
 {
     const rl_exr *file = f->files[f->main_file];
     const rl_exr_part *part = rl_exr_part_at(file, f->main_part);
-    const double *fov = rl_manifest_fov_x(r->setup.manifest, file_number);
-    const double *jitter = rl_manifest_jitter(r->setup.manifest, file_number);
-    c->screen_width = (double)part->screen_width;
-    c->screen_center[0] = (double)part->screen_center[0];
-    c->screen_center[1] = (double)part->screen_center[1];
+    const rl_manifest *m = r->setup.manifest;
+    const double *fov = rl_manifest_fov_x(m, file_number);
+    const double *jitter = rl_manifest_jitter(m, file_number);
+    rl_camera_lens lens;
+    rl_camera_header_lens(file, f->main_part, m->camera.forward_z, &lens);
+    c->fov_x = fov ? *fov : lens.fov_x;
+    c->screen_width = fov ? (double)part->screen_width : lens.width;
+    for (int i = 0; i < 2; i++)
+        c->screen_center[i] = fov ? (double)part->screen_center[i] : lens.centre[i];
     c->pixel_aspect = (double)part->pixel_aspect;
-    if (fov) {
-        c->fov_x = *fov;
-    } else if (!number_attr(file, f->main_part, "camera:fovx", 1, &c->fov_x) && !r->said_window) {
+    if (!fov && !r->said_window) {
+        bool window = !strcmp(lens.source, "screenWindowWidth"), unknown = window && lens.width == 1;
         r->said_window = true;
         rl_report(
-            r->setup.log, c->screen_width == 1 ? RL_WARNING : RL_VERBOSE,
-            (rl_where){.file = rl_exr_path(file)},
-            "no attribute camera:fovx: the field of view is taken from screenWindowWidth %g%s",
-            c->screen_width,
-            c->screen_width == 1
-                ? ", which writers leave at 1 when they do not know it (set camera.fov_x in the manifest)"
+            r->setup.log, unknown ? RL_WARNING : RL_VERBOSE, (rl_where){.file = rl_exr_path(file)},
+            "%sthe field of view is taken from %s%s", window ? "no attribute camera:fovx: " : "", lens.source,
+            unknown
+                ? " 1, which writers leave at 1 when they do not know it (set camera.fov_x in the manifest)"
                 : "");
     }
     if (jitter) {
@@ -93,14 +95,15 @@ static rl_code read_camera(rl_reader *r, rl_frame *f, int file_number, rl_error 
     const rl_exr *file = f->files[f->main_file];
     double header[16];
     float header_f[16];
-    bool has = number_attr(file, f->main_part, "worldToCamera", 16, header);
-    for (int i = 0; i < 16 && has; i++)
+    const char *from =
+        rl_camera_header_matrix(file, f->main_part, r->setup.manifest->camera.forward_z, header);
+    for (int i = 0; i < 16 && from; i++)
         header_f[i] = (float)header[i];
     rl_camera_info c = {.display = {f->display_window.x0, f->display_window.y0,
                                     f->display_window.x1 - f->display_window.x0 + 1,
                                     f->display_window.y1 - f->display_window.y0 + 1}};
     rl_error inner = {0};
-    rl_code code = rl_manifest_view(r->setup.manifest, file_number, has ? header_f : NULL, c.view, &inner);
+    rl_code code = rl_manifest_view(r->setup.manifest, file_number, from ? header_f : NULL, c.view, &inner);
     if (!code) {
         read_lens(r, f, file_number, &c);
         code = rl_camera_make(&c, &f->camera, &inner);
