@@ -78,6 +78,7 @@ typedef struct rl_layer {
     const char *colorspace; /* albedo, emission, back_albedo */
     rl_space space;         /* normals */
     rl_encoding encoding;
+    int axes[3]; /* normals: which of the file's axes are x, y, z: 1, 2, 3, or negative; 1, 2, 3 as a rule */
     rl_depth_kind kind;   /* depths */
     double near_m, far_m; /* RL_DEPTH_DEVICE; metres, 0 < near < far, far may be infinite */
     bool reversed;        /* RL_DEPTH_DEVICE: 1 at the near plane */

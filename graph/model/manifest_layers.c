@@ -9,7 +9,7 @@
 const rl_layer_type rl_layer_types[RL_LAYER_COUNT] = {
     [RL_LAYER_ALBEDO] = {"albedo", RL_RGB, 3, .required = true, .keys = {"colorspace"},
                          .help = "scene-linear diffuse colour, 0..1"},
-    [RL_LAYER_NORMAL] = {"normal", RL_NORMAL, 3, .required = true, .keys = {"space", "encoding"},
+    [RL_LAYER_NORMAL] = {"normal", RL_NORMAL, 3, .required = true, .keys = {"space", "encoding", "axes"},
                          .help = "unit shading normal"},
     [RL_LAYER_DEPTH] = {"depth", RL_SCALAR, 1, .required = true,
                         .keys = {"kind", "near", "far", "reversed", "empty", "unit"},
@@ -33,7 +33,7 @@ const rl_layer_type rl_layer_types[RL_LAYER_COUNT] = {
     [RL_LAYER_BACK_DEPTH] = {"back_depth", RL_SCALAR, 1,
                              .keys = {"kind", "near", "far", "reversed", "empty", "unit"},
                              .help = "depth of the closest back face, empty where there is none"},
-    [RL_LAYER_BACK_NORMAL] = {"back_normal", RL_NORMAL, 3, .keys = {"space", "encoding"},
+    [RL_LAYER_BACK_NORMAL] = {"back_normal", RL_NORMAL, 3, .keys = {"space", "encoding", "axes"},
                               .help = "normal of the closest back face, out of the object"},
     [RL_LAYER_BACK_ALBEDO] = {"back_albedo", RL_RGB, 3, .keys = {"colorspace"},
                               .help = "albedo of the closest back face"},
@@ -103,6 +103,26 @@ static rl_code read_alternatives(const layer_reader *l, const rl_value *v)
     return code;
 }
 
+/* axes: [-x, z, y]: what the file calls x, turned around, is our x, what it calls z our y, … */
+static rl_code read_axes(const layer_reader *l, const rl_value *v)
+{
+    static const char expected[] = "three of x, y, z, -x, -y, -z, each axis once, such as [x, -z, y]";
+    unsigned seen = 0;
+    if (v->kind != RL_LIST || v->n != 3)
+        return rl_value_wrong(v, "axes", expected, l->r->err);
+    for (int i = 0; i < 3; i++) {
+        const char *text = v->items[i]->text ? v->items[i]->text : "";
+        int sign = text[0] == '-' ? -1 : 1;
+        const char *name = text + (sign < 0 || text[0] == '+');
+        bool one = name[0] >= 'x' && name[0] <= 'z' && !name[1];
+        if (!one || seen & 1u << (name[0] - 'x'))
+            return rl_value_wrong(v->items[i], "axes", expected, l->r->err);
+        seen |= 1u << (name[0] - 'x');
+        l->layer->axes[i] = sign * (name[0] - 'x' + 1);
+    }
+    return RL_OK;
+}
+
 static rl_code read_normal(const layer_reader *l)
 {
     const rl_value *space = stated(l, "space", "world"), *encoding = stated(l, "encoding", "signed");
@@ -113,7 +133,10 @@ static rl_code read_normal(const layer_reader *l)
     if (!code && encoding)
         code = rl_value_word(encoding, "encoding", "signed|unsigned|octahedral", &word, l->r->err);
     l->layer->encoding = (rl_encoding)word;
-    return code;
+    const rl_value *axes = rl_value_get(l->map, "axes");
+    for (int i = 0; i < 3; i++)
+        l->layer->axes[i] = i + 1;
+    return code || !axes ? code : read_axes(l, axes);
 }
 
 static rl_code read_device(const layer_reader *l)

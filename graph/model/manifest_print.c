@@ -127,6 +127,10 @@ static void print_layer(const rl_manifest *m, const rl_layer *l, rl_str *s)
     if (format == RL_NORMAL)
         rl_str_printf(s, ", space: %s, encoding: %s", l->space == RL_SPACE_CAMERA ? "camera" : "world",
                       encodings[l->encoding]);
+    if (format == RL_NORMAL && (l->axes[0] != 1 || l->axes[1] != 2 || l->axes[2] != 3))
+        for (int i = 0; i < 3; i++)
+            rl_str_printf(s, "%s%s%c%s", i ? ", " : ", axes: [", l->axes[i] < 0 ? "-" : "",
+                          "xyz"[abs(l->axes[i]) - 1], i == 2 ? "]" : "");
     if (l->id == RL_LAYER_DEPTH || l->id == RL_LAYER_BACK_DEPTH)
         print_depth(l, s);
     if (l->id == RL_LAYER_MOTION)

@@ -2,6 +2,7 @@
 #include <string.h>
 
 #include "graph/base/alloc.h"
+#include "graph/run/normal_check.h"
 #include "graph/run/reader_parts.h"
 
 rl_code rl_reader_map(rl_reader *r, rl_frame *f, rl_frame_maps *maps, rl_error *err)
@@ -109,8 +110,38 @@ static rl_code collect_group(rl_reader *r, rl_frame *f, bool *done, int first, g
     return code;
 }
 
+/* Whether the capture's conventions can be right, in the first frame that is read. */
+static void check_normals(rl_reader *r, const rl_frame *f, const rl_frame_maps *maps)
+{
+    int normal = -1;
+    for (int i = 0; i < r->n_bindings; i++)
+        normal = r->bindings[i].layer->id == RL_LAYER_NORMAL ? i : normal;
+    if (r->said_normals || normal < 0)
+        return;
+    r->said_normals = true;
+    rl_normal_view view = {.depth = maps->base[r->depth][0],
+                           .stride = (size_t)f->geometry.stride,
+                           .width = f->geometry.width,
+                           .height = f->geometry.height,
+                           .x = f->data_window.x0,
+                           .y = f->data_window.y0,
+                           .camera = &f->camera};
+    const rl_layer *n = r->bindings[normal].layer, *d = r->bindings[r->depth].layer;
+    bool forward_z = r->setup.manifest->camera.forward_z;
+    rl_normal_check check;
+    rl_str text = {0};
+    for (int i = 0; i < 3; i++)
+        view.normal[i] = maps->base[normal][i];
+    rl_normal_check_run(&view, n, d, forward_z, &check);
+    if (rl_normal_check_advice(&check, n, d, forward_z, &text) && !text.failed)
+        rl_report(r->setup.log, RL_WARNING, n->where, "frame %d: %s", f->number, rl_str_text(&text));
+    rl_str_free(&text);
+}
+
 rl_code rl_reader_finish(rl_reader *r, rl_frame *f, rl_frame_maps *maps, rl_code code, rl_error *err)
 {
+    if (!code && !maps->error.code)
+        check_normals(r, f, maps);
     rl_code unmapped = unmap_planes(r, f, maps, code ? NULL : err);
     code = code ? code : unmapped;
     f->clamped = maps->clamped;
