@@ -70,9 +70,9 @@ typedef struct rl_layer {
     /* Alternatives of n_channels names each, one after the other; after rl_manifest_bind one is left. A name
      * may hold one '*' (presets: the view layer's name). */
     const char **channels;
-    int n_channels, n_alternatives;
-    const char *part; /* of a multi-part file; NULL: whichever has the channels */
-    int pattern;      /* index into rl_manifest.patterns */
+    int n_channels, n_alternatives; /* 0, 0: a stencil that is constant */
+    const char *part;               /* of a multi-part file; NULL: whichever has the channels */
+    int pattern;                    /* index into rl_manifest.patterns */
     bool from_preset; /* not the user's own: dropped by rl_manifest_bind when the file lacks it */
 
     const char *colorspace; /* albedo, emission, back_albedo */
@@ -80,6 +80,8 @@ typedef struct rl_layer {
     rl_encoding encoding;
     int axes[3]; /* normals: which of the file's axes are x, y, z: 1, 2, 3, or negative; 1, 2, 3 as a rule */
     rl_depth_kind kind;   /* depths */
+    bool hashed;          /* stencil: Cryptomatte, the bits of a float are the id */
+    uint32_t constant;    /* stencil: the id of all pixels, when n_channels is 0 */
     double near_m, far_m; /* RL_DEPTH_DEVICE; metres, 0 < near < far, far may be infinite */
     bool reversed;        /* RL_DEPTH_DEVICE: 1 at the near plane */
     double empty;         /* the file's value from which on (reversed: down to which) a pixel is empty */

@@ -14,7 +14,8 @@ const rl_layer_type rl_layer_types[RL_LAYER_COUNT] = {
     [RL_LAYER_DEPTH] = {"depth", RL_SCALAR, 1, .required = true,
                         .keys = {"kind", "near", "far", "reversed", "empty", "unit"},
                         .help = "distance along the view axis"},
-    [RL_LAYER_STENCIL] = {"stencil", RL_ID, 1, .required = true, .help = "material id, any 32-bit integer"},
+    [RL_LAYER_STENCIL] = {"stencil", RL_ID, 1, .required = true, .keys = {"encoding", "constant"},
+                          .help = "material id, any 32-bit integer"},
     [RL_LAYER_THICKNESS] = {"thickness", RL_SCALAR, 1, .keys = {"unit", "remap"},
                             .help = "length along the inward normal to the back face, 0 = unknown"},
     [RL_LAYER_SHADOW] = {"shadow", RL_LIGHTS, 1, .per_light = true, .help = "visibility of a light, 0..1"},
@@ -139,6 +140,23 @@ static rl_code read_normal(const layer_reader *l)
     return code || !axes ? code : read_axes(l, axes);
 }
 
+static rl_code read_stencil(const layer_reader *l)
+{
+    const rl_value *encoding = rl_value_get(l->map, "encoding"), *constant = rl_value_get(l->map, "constant");
+    int word = 0;
+    long long id = 0;
+    rl_code code =
+        encoding ? rl_value_word(encoding, "encoding", "integer|cryptomatte", &word, l->r->err) : RL_OK;
+    if (!code && constant)
+        code = rl_value_integer(constant, "constant", INT32_MIN, UINT32_MAX, &id, l->r->err);
+    if (!code && constant && (encoding || rl_value_get(l->map, "channels") || rl_value_get(l->map, "part")))
+        code = rl_fail(l->r->err, RL_E_CONFIG, constant->where,
+                       "layer 'stencil': 'constant' is the id of every pixel, instead of channels");
+    l->layer->hashed = word == 1;
+    l->layer->constant = (uint32_t)id;
+    return code;
+}
+
 static rl_code read_device(const layer_reader *l)
 {
     rl_layer *layer = l->layer;
@@ -250,6 +268,10 @@ static rl_code read_layer(rl_manifest_reader *r, rl_layer_id id, const rl_entry 
         code = read_scale(&l);
     if (!code && has_key(type, "space"))
         code = read_normal(&l);
+    if (!code && id == RL_LAYER_STENCIL)
+        code = read_stencil(&l);
+    if (!code && id == RL_LAYER_STENCIL && rl_value_get(l.map, "constant"))
+        return RL_OK;
     if (!code && has_key(type, "kind"))
         code = read_depth(&l);
     if (!code && has_key(type, "points"))

@@ -114,6 +114,10 @@ static void print_layer(const rl_manifest *m, const rl_layer *l, rl_str *s)
         print_text(s, l->channels[0]);
         return;
     }
+    if (!l->n_channels) {
+        rl_str_printf(s, "{constant: %u}", (unsigned)l->constant);
+        return;
+    }
     rl_str_add(s, "{channels: ");
     print_channels(l, s);
     if (l->part) {
@@ -124,6 +128,8 @@ static void print_layer(const rl_manifest *m, const rl_layer *l, rl_str *s)
         rl_str_add(s, ", colorspace: ");
         print_text(s, l->colorspace);
     }
+    if (l->hashed)
+        rl_str_add(s, ", encoding: cryptomatte");
     if (format == RL_NORMAL)
         rl_str_printf(s, ", space: %s, encoding: %s", l->space == RL_SPACE_CAMERA ? "camera" : "world",
                       encodings[l->encoding]);

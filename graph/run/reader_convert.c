@@ -54,6 +54,10 @@ static void convert_normal(const rl_reader *r, const rl_frame *f, const rl_layer
 static void convert_stencil(const rl_reader *r, rl_frame *f, rl_frame_maps *maps, uint32_t *p, rl_rows rows)
 {
     rl_unknown_ids unknown = {0};
+    const rl_layer *layer = r->bindings[r->stencil].layer;
+    for (int y = rows.y0; y < rows.y1 && !layer->n_channels; y++)
+        for (int x = 0; x < rows.width; x++)
+            p[(size_t)y * rows.stride + (size_t)x] = layer->constant;
     for (int y = rows.y0; y < rows.y1 && f->ids; y++)
         memcpy(f->ids + (size_t)y * (size_t)rows.width, p + (size_t)y * rows.stride,
                (size_t)rows.width * sizeof *p);

@@ -128,6 +128,8 @@ static rl_code check_layers(rl_reader *r, rl_frame *f, rl_error *err)
         const rl_layer *layer = r->bindings[i].layer;
         const rl_exr *file = f->files[layer->pattern];
         int part = 0;
+        if (!layer->n_channels)
+            continue;
         rl_code code = rl_reader_find_part(layer, file, &part, err);
         if (code)
             return code;

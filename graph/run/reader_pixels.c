@@ -75,6 +75,7 @@ static rl_code read_group(group *g, rl_pool *pool, rl_error *err)
         for (int k = 0; k < b->layer->n_channels; k++) {
             float *p = g->maps->base[g->members[i]][k];
             rl_exr_plane plane = {.channel = b->layer->channels[k], .stride = (size_t)g->f->geometry.stride};
+            plane.bits = b->layer->hashed;
             if (b->is_stencil)
                 plane.ids = (uint32_t *)(void *)p;
             else
@@ -98,7 +99,7 @@ static rl_code collect_group(rl_reader *r, rl_frame *f, bool *done, int first, g
     rl_code code = rl_reader_find_part(r->bindings[first].layer, f->files[g->file], &g->part, err);
     for (int i = first; i < r->n_bindings && !code; i++) {
         int part = -1;
-        if (done[i] || r->bindings[i].layer->pattern != g->file)
+        if (done[i] || r->bindings[i].layer->pattern != g->file || !r->bindings[i].layer->n_channels)
             continue;
         code = rl_reader_find_part(r->bindings[i].layer, f->files[g->file], &part, err);
         if (code || part != g->part)
@@ -185,7 +186,7 @@ rl_code rl_reader_pixels(rl_reader *r, rl_frame *f, rl_pool *pool, rl_error *err
     bool stencil_done = false;
     for (int i = 0; i < r->n_bindings && !code; i++) {
         group g = {.r = r, .f = f, .maps = &maps};
-        if (done[i])
+        if (done[i] || !r->bindings[i].layer->n_channels) /* a constant stencil follows */
             continue;
         code = collect_group(r, f, done, i, &g, err);
         if (!code)

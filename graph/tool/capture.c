@@ -118,7 +118,8 @@ static rl_code read_ids(const rl_exr *file, const rl_layer *layer, uint32_t **ou
     *out = rl_calloc(*pixels, sizeof **out);
     if (!*out)
         return rl_fail_memory(err, *pixels * sizeof **out);
-    rl_exr_plane plane = {.channel = layer->channels[0], .ids = *out, .stride = (size_t)p->width};
+    rl_exr_plane plane = {
+        .channel = layer->channels[0], .ids = *out, .bits = layer->hashed, .stride = (size_t)p->width};
     return rl_exr_read(file, part, &plane, 1, NULL, NULL, err);
 }
 
@@ -132,6 +133,10 @@ rl_code rl_capture_ids(rl_arena *arena, const rl_manifest *m, size_t most, uint3
     *n = 0;
     if (!layer)
         return RL_OK;
+    if (!layer->n_channels && most) {
+        out[(*n)++] = layer->constant;
+        return RL_OK;
+    }
     char *path = rl_capture_first(arena, m, layer->pattern);
     rl_code code = path ? rl_exr_open(path, 0, &file, err) : rl_fail_memory(err, 1);
     if (!code)
