@@ -112,6 +112,8 @@ typedef struct rl_camera_spec {
     double (*jitter)[2];  /* pixels, x right, y down */
     size_t n_matrix, n_fov, n_jitter; /* 1, or one a frame of rl_manifest.frames */
     bool forward_z;                   /* forward: +z, left-handed */
+    bool has_shift;                   /* else the header's screen window says it */
+    double shift[2]; /* of the lens: the image is moved right and up, in widths of the display window */
 } rl_camera_spec;
 
 /* ---- the manifest ---- */
@@ -194,6 +196,11 @@ typedef struct rl_channel {
 rl_code rl_manifest_bind(rl_arena *arena, rl_manifest *m, int pattern, const char *file,
                          const rl_channel *channels, size_t n, rl_error *err);
 
+/* The same for a manifest of one pattern, without an error for required layers that are not there: they go.
+ */
+rl_code rl_manifest_bind_found(rl_arena *arena, rl_manifest *m, const rl_channel *channels, size_t n,
+                               rl_error *err);
+
 /* The error of a file that lacks a channel of a layer: says what is needed, what is there, and where to set
  * it. */
 rl_code rl_layer_missing(const rl_layer *layer, const char *file, const rl_channel *channels, size_t n,
@@ -210,6 +217,15 @@ typedef struct rl_preset_match {
  * layers found, then by name. */
 rl_code rl_preset_find(rl_arena *arena, const char *presets, const rl_channel *channels, size_t n,
                        rl_preset_match *out, rl_error *err);
+
+/* What a preset says to its users. */
+typedef struct rl_preset_words {
+    const char *help;   /* one line */
+    const char **check; /* what to look after, a line each */
+    size_t n_check;
+} rl_preset_words;
+rl_code rl_preset_about(rl_arena *arena, const char *presets, const char *name, rl_preset_words *out,
+                        rl_error *err);
 
 /* A preset's value tree, without its own keys; an unknown name suggests the nearest. */
 rl_code rl_preset_load(rl_arena *arena, const char *presets, const char *name, rl_where where, rl_value **out,

@@ -103,11 +103,11 @@ static rl_code read_jitter(rl_manifest_reader *r, const rl_value *v)
 
 rl_code rl_manifest_read_camera(rl_manifest_reader *r, const rl_value *v)
 {
-    static const char *const known[] = {"matrix", "forward", "fov_x", "jitter"};
+    static const char *const known[] = {"matrix", "forward", "fov_x", "jitter", "shift"};
     rl_camera_spec *c = &r->m->camera;
     bool own = v && !(r->preset_file && v->where.file && !strcmp(v->where.file, r->preset_file));
     c->where = own ? v->where : r->m->where; /* a preset is no place to correct what a capture lacks */
-    rl_code code = v ? rl_value_keys(v, "camera", known, 4, r->err) : RL_OK;
+    rl_code code = v ? rl_value_keys(v, "camera", known, 5, r->err) : RL_OK;
     const rl_value *forward = rl_value_get(v, "forward");
     int word = 0;
     if (!forward)
@@ -115,6 +115,10 @@ rl_code rl_manifest_read_camera(rl_manifest_reader *r, const rl_value *v)
     if (!code && forward)
         code = rl_value_word(forward, "forward", "-z|+z", &word, r->err);
     c->forward_z = word == 1;
+    const rl_value *shift = rl_value_get(v, "shift");
+    c->has_shift = !is_header(shift);
+    if (!code && c->has_shift)
+        code = rl_value_numbers(shift, "shift", 2, c->shift, r->err);
     if (!code)
         code = read_matrix(r, rl_value_get(v, "matrix"));
     if (!code)

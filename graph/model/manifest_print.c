@@ -35,9 +35,9 @@ static void print_numbers(rl_str *s, const double *x, size_t n)
     rl_str_add(s, "]");
 }
 
-/* header, one value, or one a frame */
+/* header, one value, or one a frame; each number divided by `unit` */
 static void print_source(rl_str *s, const char *key, rl_source source, const double *x, size_t width,
-                         size_t n)
+                         size_t n, double unit)
 {
     rl_str_printf(s, "  %s: ", key);
     if (source == RL_SOURCE_HEADER)
@@ -46,12 +46,12 @@ static void print_source(rl_str *s, const char *key, rl_source source, const dou
         for (size_t i = 0; i < n; i++) {
             rl_str_add(s, i ? ", " : "[");
             if (width == 1)
-                print_number(s, x[i]);
+                print_number(s, x[i] / unit);
             else
                 print_numbers(s, x + i * width, width);
         }
     else if (width == 1)
-        print_number(s, x[0]);
+        print_number(s, x[0] / unit);
     else
         print_numbers(s, x, width);
     rl_str_add(s, source == RL_SOURCE_LIST ? "]\n" : "\n");
@@ -60,10 +60,15 @@ static void print_source(rl_str *s, const char *key, rl_source source, const dou
 static void print_camera(const rl_camera_spec *c, rl_str *s)
 {
     rl_str_add(s, "camera:\n");
-    print_source(s, "matrix", c->matrix_source, c->matrix ? c->matrix[0] : NULL, 16, c->n_matrix);
+    print_source(s, "matrix", c->matrix_source, c->matrix ? c->matrix[0] : NULL, 16, c->n_matrix, 1);
     rl_str_printf(s, "  forward: %s\n", c->forward_z ? "+z" : "-z");
-    print_source(s, "fov_x", c->fov_source, c->fov_x, 1, c->n_fov);
-    print_source(s, "jitter", c->jitter_source, c->jitter ? c->jitter[0] : NULL, 2, c->n_jitter);
+    print_source(s, "fov_x", c->fov_source, c->fov_x, 1, c->n_fov, pi / 180); /* degrees */
+    if (c->has_shift) {
+        rl_str_add(s, "  shift: ");
+        print_numbers(s, c->shift, 2);
+        rl_str_add(s, "\n");
+    }
+    print_source(s, "jitter", c->jitter_source, c->jitter ? c->jitter[0] : NULL, 2, c->n_jitter, 1);
 }
 
 static void print_depth(const rl_layer *l, rl_str *s)

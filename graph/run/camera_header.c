@@ -145,3 +145,33 @@ void rl_camera_header_lens(const rl_exr *file, int part, bool forward_z, rl_came
         out->source = "screenWindowWidth";
     }
 }
+
+rl_code rl_camera_read(const rl_manifest *m, int frame, const rl_exr *file, int part, rl_camera_info *out,
+                       rl_camera_lens *lens, bool *has_jitter, rl_error *err)
+{
+    const rl_exr_part *p = rl_exr_part_at(file, part);
+    const double *fov = rl_manifest_fov_x(m, frame), *jitter = rl_manifest_jitter(m, frame);
+    double header[16];
+    float row_vectors[16];
+    const char *from = rl_camera_header_matrix(file, part, m->camera.forward_z, header);
+    for (int i = 0; i < 16 && from; i++)
+        row_vectors[i] = (float)header[i];
+    rl_camera_header_lens(file, part, m->camera.forward_z, lens);
+    *out = (rl_camera_info){.fov_x = fov ? *fov : lens->fov_x,
+                            .screen_width = fov ? (double)p->screen_width : lens->width,
+                            .pixel_aspect = (double)p->pixel_aspect,
+                            .display = {p->display_window.x0, p->display_window.y0,
+                                        p->display_window.x1 - p->display_window.x0 + 1,
+                                        p->display_window.y1 - p->display_window.y0 + 1}};
+    for (int i = 0; i < 2; i++)
+        out->screen_center[i] = fov ? (double)p->screen_center[i] : lens->centre[i];
+    double window = out->screen_width > 0 ? out->screen_width : 2 * tan(out->fov_x / 2);
+    for (int i = 0; i < 2 && m->camera.has_shift; i++)
+        out->screen_center[i] = m->camera.shift[i] * window;
+    *has_jitter = jitter != NULL;
+    if (jitter)
+        memcpy(out->jitter, jitter, sizeof out->jitter);
+    else
+        *has_jitter = numbers(file, part, "camera:jitter", 2, out->jitter);
+    return rl_manifest_view(m, frame, from ? row_vectors : NULL, out->view, err);
+}

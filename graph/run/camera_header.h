@@ -4,6 +4,8 @@
 
 #include <stdbool.h>
 
+#include "graph/model/manifest.h"
+#include "graph/run/camera.h"
 #include "graph/run/exr.h"
 
 #ifdef __cplusplus
@@ -27,6 +29,12 @@ typedef struct rl_camera_lens {
 /* The first that the header has: camera:fovx (radians), worldToNDC beside worldToCamera (with the lens's
  * shift), V-Ray's cameraFov or Unreal's fov (degrees), else the screen window that every EXR has. */
 void rl_camera_header_lens(const rl_exr *file, int part, bool forward_z, rl_camera_lens *out);
+
+/* The camera of a frame: what the manifest states, and what it leaves to the header; jitter only if the
+ * manifest or camera:jitter gives it (*has_jitter). The lens is what the header says, whether it is used or
+ * not. */
+rl_code rl_camera_read(const rl_manifest *manifest, int frame, const rl_exr *file, int part,
+                       rl_camera_info *out, rl_camera_lens *lens, bool *has_jitter, rl_error *err);
 
 #ifdef __cplusplus
 }

@@ -1,5 +1,4 @@
 /* Layers from the file's conventions to relit's, rows at a time. */
-#include <stdlib.h>
 #include <string.h>
 
 #include "graph/run/reader_parts.h"
@@ -38,16 +37,9 @@ static void convert_normal(const rl_reader *r, const rl_frame *f, const rl_layer
                            rl_rows rows)
 {
     float m[9];
-    bool camera = layer->space == RL_SPACE_CAMERA, plain = true;
-    for (int i = 0; i < 9; i++) { /* a capture that looks down +z has its own z turned around */
-        int from = layer->axes[i % 3], sign = from < 0 ? -1 : 1, to = 3 * (i / 3) + abs(from) - 1;
-        float v = camera ? f->camera.to_world[4 * (i / 3) + i % 3] : i / 3 == i % 3 ? 1.0f : 0.0f;
-        if (camera && i % 3 == 2 && r->setup.manifest->camera.forward_z)
-            v = -v;
-        m[to] = sign < 0 ? -v : v;
-        plain = plain && from == i % 3 + 1;
-    }
-    rl_ingest_normal how = {.encoding = layer->encoding, .rotate = camera || !plain ? m : NULL};
+    bool forward_z = r->setup.manifest->camera.forward_z;
+    rl_ingest_normal how = {.encoding = layer->encoding,
+                            .rotate = rl_ingest_normal_matrix(layer, &f->camera, forward_z, m)};
     rl_ingest_normal_rows(p, rows, &how);
 }
 

@@ -48,44 +48,28 @@ rl_code rl_reader_find_part(const rl_layer *layer, const rl_exr *file, int *out,
 /* ---- headers ---------------------------------------------------------------------------------------------
  */
 
-static bool number_attr(const rl_exr *file, int part, const char *name, int n, double *out)
+/* Says once what the file leaves open. */
+static void report_camera(rl_reader *r, const rl_frame *f, int file_number, const rl_camera_lens *lens,
+                          bool has_jitter)
 {
-    rl_exr_value v;
-    if (!rl_exr_attr(file, part, name, &v) || rl_exr_type_numbers(v.type) != n)
-        return false;
-    memcpy(out, v.v, (size_t)n * sizeof *out);
-    return true;
-}
-
-static void read_lens(rl_reader *r, const rl_frame *f, int file_number, rl_camera_info *c)
-{
-    const rl_exr *file = f->files[f->main_file];
-    const rl_exr_part *part = rl_exr_part_at(file, f->main_part);
-    const rl_manifest *m = r->setup.manifest;
-    const double *fov = rl_manifest_fov_x(m, file_number);
-    const double *jitter = rl_manifest_jitter(m, file_number);
-    rl_camera_lens lens;
-    rl_camera_header_lens(file, f->main_part, m->camera.forward_z, &lens);
-    c->fov_x = fov ? *fov : lens.fov_x;
-    c->screen_width = fov ? (double)part->screen_width : lens.width;
-    for (int i = 0; i < 2; i++)
-        c->screen_center[i] = fov ? (double)part->screen_center[i] : lens.centre[i];
-    c->pixel_aspect = (double)part->pixel_aspect;
-    if (!fov && !r->said_window) {
-        bool window = !strcmp(lens.source, "screenWindowWidth"), unknown = window && lens.width == 1;
+    const rl_where where = {.file = rl_exr_path(f->files[f->main_file])};
+    bool window = !strcmp(lens->source, "screenWindowWidth"), unknown = window && lens->width == 1;
+    if (!rl_manifest_fov_x(r->setup.manifest, file_number) && !r->said_window) {
         r->said_window = true;
-        rl_report(
-            r->setup.log, unknown ? RL_WARNING : RL_VERBOSE, (rl_where){.file = rl_exr_path(file)},
-            "%sthe field of view is taken from %s%s", window ? "no attribute camera:fovx: " : "", lens.source,
-            unknown
-                ? " 1, which writers leave at 1 when they do not know it (set camera.fov_x in the manifest)"
-                : "");
+        if (window)
+            rl_report(r->setup.log, unknown ? RL_WARNING : RL_VERBOSE, where,
+                      "no attribute camera:fovx: the field of view is taken from screenWindowWidth %g%s",
+                      lens->width,
+                      unknown
+                          ? ", which writers leave at 1 when they do not know it (set camera.fov_x in the "
+                            "manifest)"
+                          : "");
+        else
+            rl_report(r->setup.log, RL_VERBOSE, where, "the field of view is taken from %s", lens->source);
     }
-    if (jitter) {
-        memcpy(c->jitter, jitter, sizeof c->jitter);
-    } else if (!number_attr(file, f->main_part, "camera:jitter", 2, c->jitter) && !r->said_jitter) {
+    if (!has_jitter && !r->said_jitter) {
         r->said_jitter = true;
-        rl_report(r->setup.log, RL_VERBOSE, (rl_where){.file = rl_exr_path(file)},
+        rl_report(r->setup.log, RL_VERBOSE, where,
                   "no attribute camera:jitter: samples lie at the pixels' centres");
     }
 }
@@ -93,19 +77,14 @@ static void read_lens(rl_reader *r, const rl_frame *f, int file_number, rl_camer
 static rl_code read_camera(rl_reader *r, rl_frame *f, int file_number, rl_error *err)
 {
     const rl_exr *file = f->files[f->main_file];
-    double header[16];
-    float header_f[16];
-    const char *from =
-        rl_camera_header_matrix(file, f->main_part, r->setup.manifest->camera.forward_z, header);
-    for (int i = 0; i < 16 && from; i++)
-        header_f[i] = (float)header[i];
-    rl_camera_info c = {.display = {f->display_window.x0, f->display_window.y0,
-                                    f->display_window.x1 - f->display_window.x0 + 1,
-                                    f->display_window.y1 - f->display_window.y0 + 1}};
+    rl_camera_info c;
+    rl_camera_lens lens;
     rl_error inner = {0};
-    rl_code code = rl_manifest_view(r->setup.manifest, file_number, from ? header_f : NULL, c.view, &inner);
+    bool has_jitter;
+    rl_code code =
+        rl_camera_read(r->setup.manifest, file_number, file, f->main_part, &c, &lens, &has_jitter, &inner);
     if (!code) {
-        read_lens(r, f, file_number, &c);
+        report_camera(r, f, file_number, &lens, has_jitter);
         code = rl_camera_make(&c, &f->camera, &inner);
     }
     if (code)

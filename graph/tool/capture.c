@@ -6,6 +6,7 @@
 #include "graph/base/alloc.h"
 #include "graph/base/file.h"
 #include "graph/run/data_files.h"
+#include "graph/tool/cryptomatte.h"
 
 static bool is_yaml(const char *path)
 {
@@ -19,8 +20,7 @@ char *rl_capture_first(rl_arena *arena, const rl_manifest *m, int pattern)
     return rl_manifest_path(arena, m, &any, m->frames.n ? m->frames.numbers[0] : 1);
 }
 
-/* All channels of an open file; names live as long as the file. */
-static rl_code list_channels(rl_arena *arena, const rl_exr *file, rl_channel **out, size_t *n, rl_error *err)
+rl_code rl_capture_channels(rl_arena *arena, const rl_exr *file, rl_channel **out, size_t *n, rl_error *err)
 {
     *n = 0;
     for (int p = 0; p < rl_exr_parts(file); p++)
@@ -52,7 +52,7 @@ static rl_code find_bare(rl_arena *arena, const char *path, const char *presets,
     if (!code)
         code = rl_exr_open(first, 0, &file, err);
     if (!code)
-        code = list_channels(arena, file, &channels, &n, err);
+        code = rl_capture_channels(arena, file, &channels, &n, err);
     if (!code)
         code = rl_preset_find(arena, presets, channels, n, &match, err);
     if (code)
@@ -63,6 +63,8 @@ static rl_code find_bare(rl_arena *arena, const char *path, const char *presets,
         code = rl_manifest_bare(arena, path, match.name, presets, log, &out->manifest, err);
     if (!code && !out->missing)
         code = rl_manifest_bind(arena, out->manifest, 0, first, channels, n, err);
+    if (!code && !out->missing)
+        code = rl_capture_name_ids(arena, out->manifest, err);
 done:
     rl_exr_close(&file);
     return code;
@@ -147,6 +149,26 @@ rl_code rl_capture_ids(rl_arena *arena, const rl_manifest *m, size_t most, uint3
         if (ids[i] && (!i || ids[i] != ids[i - 1]))
             out[(*n)++] = ids[i];
     rl_free(ids);
+    rl_exr_close(&file);
+    return code;
+}
+
+rl_code rl_capture_name_ids(rl_arena *arena, rl_manifest *m, rl_error *err)
+{
+    enum { MOST = 256 };
+    const rl_layer *layer = rl_manifest_layer(m, "stencil");
+    uint32_t ids[MOST];
+    size_t n;
+    rl_exr *file = NULL;
+    if (!layer || !layer->hashed || m->n_stencil_names)
+        return RL_OK;
+    char *path = rl_capture_first(arena, m, layer->pattern);
+    rl_code code = path ? rl_capture_ids(arena, m, MOST, ids, &n, err) : rl_fail_memory(err, 1);
+    if (!code)
+        code = rl_exr_open(path, 0, &file, err);
+    if (!code)
+        code = rl_cryptomatte_names(arena, file, layer->channels[0], ids, n, &m->stencil_names,
+                                    &m->n_stencil_names, err);
     rl_exr_close(&file);
     return code;
 }

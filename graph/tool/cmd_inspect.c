@@ -9,6 +9,7 @@
 
 #include "graph/base/file.h"
 #include "graph/tool/capture.h"
+#include "graph/tool/inspect_guess.h"
 #include "graph/tool/tool.h"
 
 /* ---- one file -------------------------------------------------------------------------------------------
@@ -88,38 +89,11 @@ static rl_code print_file(const char *path, rl_str *out, rl_error *err)
 /* ---- how relit would read it ----------------------------------------------------------------------------
  */
 
-/* A guessed manifest is to be saved beside the files: their names in it are without a folder. */
-static rl_code print_guess(rl_arena *arena, const rl_capture *capture, rl_str *out, rl_error *err)
-{
-    rl_manifest m = *capture->manifest;
-    rl_pattern *patterns = rl_arena_array(arena, (size_t)m.n_patterns + 1, sizeof *patterns);
-    const char *folder = m.n_patterns ? rl_path_folder(arena, m.patterns[0].path) : ".";
-    if (!patterns || !folder)
-        return rl_fail_memory(err, sizeof *patterns);
-    for (int i = 0; i < m.n_patterns; i++) {
-        patterns[i] = m.patterns[i];
-        patterns[i].path = rl_path_name(m.patterns[i].path);
-    }
-    m.patterns = patterns;
-    rl_str_printf(out, "# guessed by preset '%s': check units and spaces, then save it as %s/capture.yaml\n",
-                  capture->preset, folder);
-    rl_manifest_print(&m, out);
-    return RL_OK;
-}
-
-static rl_code print_mapping(rl_arena *arena, const rl_capture *capture, rl_str *out, rl_error *err)
+static rl_code print_mapping(rl_tool *tool, const rl_capture *capture, rl_str *out, rl_error *err)
 {
     rl_str_add(out, "\n");
-    if (capture->missing) {
-        rl_str_printf(out, "# no preset finds all that relit needs: %s missing", capture->missing);
-        if (capture->preset)
-            rl_str_printf(out, " in '%s', which fits best", capture->preset);
-        rl_str_add(out, "\n# write a capture.yaml that says which channels hold albedo, normal, depth and "
-                        "stencil\n");
-        return RL_OK;
-    }
     if (!capture->file)
-        return print_guess(arena, capture, out, err);
+        return rl_inspect_guess(tool, capture, out, err);
     rl_str_printf(out, "# %s, as relit reads it\n", capture->file);
     rl_manifest_print(capture->manifest, out);
     return RL_OK;
@@ -134,7 +108,7 @@ static rl_code print_capture(rl_tool *tool, const char *path, rl_str *out, rl_er
         char *first = rl_capture_first(tool->arena, capture.manifest, i);
         code = first ? print_file(first, out, err) : rl_fail_memory(err, strlen(path));
     }
-    return code ? code : print_mapping(tool->arena, &capture, out, err);
+    return code ? code : print_mapping(tool, &capture, out, err);
 }
 
 /* ---- a folder of files ----------------------------------------------------------------------------------
@@ -223,7 +197,7 @@ static rl_code print_one(rl_tool *tool, const char *path, rl_str *out, rl_error 
     rl_code code = print_file(path, out, err);
     if (!code)
         code = rl_capture_find(tool->arena, pattern, &tool->report->log, &capture, err);
-    return code ? code : print_mapping(tool->arena, &capture, out, err);
+    return code ? code : print_mapping(tool, &capture, out, err);
 }
 
 /* `relit inspect DIR > DIR/capture.yaml`: the shell has made the file, and nothing is in it yet. */

@@ -1,0 +1,323 @@
+#include "graph/tool/inspect_guess.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "graph/base/file.h"
+#include "graph/run/camera_header.h"
+#include "graph/run/data_files.h"
+#include "graph/tool/guess.h"
+#include "graph/tool/probe.h"
+
+static const double pi = 3.14159265358979323846;
+
+/* What is known while a guess is made. */
+typedef struct guesser {
+    rl_arena *arena;
+    const rl_capture *capture;
+    const rl_channel *channels;
+    size_t n;
+    const char *preset; /* whose conventions are taken; NULL: none fits well enough */
+    rl_manifest *m;
+    unsigned named; /* layers that were chosen by their names alone: 1 << id */
+    bool positions;
+    rl_guess position;
+    rl_probe probe;
+} guesser;
+
+/* ---- layers ----------------------------------------------------------------------------------------------
+ */
+
+/* A layer by the likeliest names, with the conventions that most renderers have. */
+static rl_code add_layer(guesser *g, rl_layer_id id, rl_error *err)
+{
+    rl_guess guess = {0};
+    bool found = rl_guess_layer(id, g->channels, g->n, &guess);
+    if (!found && id != RL_LAYER_STENCIL)
+        return RL_OK;
+    rl_manifest *m = g->m;
+    const rl_layer_type *type = &rl_layer_types[id];
+    rl_layer *layers = rl_arena_array(g->arena, (size_t)m->n_layers + 1, sizeof *layers);
+    const char **names = rl_arena_array(g->arena, 3, sizeof *names);
+    if (!layers || !names)
+        return rl_fail_memory(err, 256);
+    memcpy(names, guess.names, sizeof guess.names);
+    memcpy(layers, m->layers, (size_t)m->n_layers * sizeof *layers);
+    layers[m->n_layers++] = (rl_layer){.id = id,
+                                       .name = type->name,
+                                       .channels = names,
+                                       .n_channels = found ? type->channels : 0,
+                                       .n_alternatives = found,
+                                       .constant = 1,
+                                       .part = guess.part,
+                                       .hashed = guess.hashed,
+                                       .colorspace = type->format == RL_RGB ? "lin_rec709" : NULL,
+                                       .axes = {1, 2, 3},
+                                       .empty = id == RL_LAYER_DEPTH ? 1e10 : INFINITY,
+                                       .scale = m->unit};
+    m->layers = layers;
+    g->named |= 1u << id;
+    return RL_OK;
+}
+
+/* Which way a camera looks whose matrix mirrors: a world is right-handed as a rule. */
+static bool looks_along_z(const rl_exr *file)
+{
+    double m[16];
+    const char *from = rl_camera_header_matrix(file, 0, false, m);
+    double det = m[0] * (m[5] * m[10] - m[6] * m[9]) - m[1] * (m[4] * m[10] - m[6] * m[8]) +
+                 m[2] * (m[4] * m[9] - m[5] * m[8]);
+    return from && !strcmp(from, "worldToCamera") && det < 0;
+}
+
+/* The manifest of a file that lacks something, or that no preset knows. */
+static rl_code make_manifest(guesser *g, const rl_exr *file, rl_error *err)
+{
+    static const rl_layer_id wanted[] = {RL_LAYER_ALBEDO, RL_LAYER_NORMAL, RL_LAYER_DEPTH, RL_LAYER_STENCIL};
+    const char *presets = rl_data_path(g->arena, "presets"), *path = g->capture->manifest->patterns[0].path;
+    rl_preset_match match;
+    rl_code code = rl_preset_find(g->arena, presets, g->channels, g->n, &match, err);
+    if (!code && match.name && match.layers >= 2 && match.missing_required <= 2)
+        g->preset = match.name;
+    if (!code)
+        code = rl_manifest_bare(g->arena, path, g->preset, presets, NULL, &g->m, err);
+    if (!code && g->preset)
+        code = rl_manifest_bind_found(g->arena, g->m, g->channels, g->n, err);
+    if (!code && !g->preset)
+        g->m->camera.forward_z = looks_along_z(file);
+    for (size_t i = 0; i < sizeof wanted / sizeof *wanted && !code; i++)
+        if (!rl_manifest_layer(g->m, rl_layer_types[wanted[i]].name))
+            code = add_layer(g, wanted[i], err);
+    return code;
+}
+
+/* ---- the camera ------------------------------------------------------------------------------------------
+ */
+
+static bool same_camera(const rl_solved_camera *a, const rl_solved_camera *b)
+{
+    bool same = fabs(a->focal / b->focal - 1) < 1e-3;
+    for (int i = 0; i < 12; i++)
+        same = same && fabs(a->matrix[i] - b->matrix[i]) < 1e-3 * (1 + fabs(a->matrix[i]));
+    return same;
+}
+
+/* Cameras found from positions go into the manifest: one, or one a frame where they differ. */
+static rl_code set_cameras(guesser *g, rl_error *err)
+{
+    rl_camera_spec *c = &g->m->camera;
+    size_t n = g->m->frames.n;
+    bool still = true;
+    rl_manifest one = *g->m;
+    c->matrix = rl_arena_array(g->arena, n, sizeof *c->matrix);
+    c->fov_x = rl_arena_array(g->arena, n, sizeof *c->fov_x);
+    if (!c->matrix || !c->fov_x)
+        return rl_fail_memory(err, n * sizeof *c->matrix);
+    for (size_t i = 0; i < n; i++) {
+        rl_probe p = g->probe;
+        one.frames = (rl_frames){.numbers = &g->m->frames.numbers[i], .n = 1};
+        rl_code code = i ? rl_probe_run(&one, &g->position, g->arena, &p, err) : RL_OK;
+        if (code)
+            return code;
+        if (!p.solved) {
+            g->probe.solved = false;
+            return RL_OK;
+        }
+        still = still && same_camera(&p.camera, &g->probe.camera);
+        for (int k = 0; k < 16; k++) {
+            double v = p.camera.matrix[k] * (k / 4 == 2 && c->forward_z ? -1 : 1);
+            c->matrix[i][k] = round(v * 1e7) / 1e7;
+        }
+        c->fov_x[i] = 2 * atan(p.width / 2 / p.camera.focal);
+        c->fov_x[i] = round(c->fov_x[i] * 180 / pi * 1e5) / 1e5 * pi / 180;
+    }
+    c->matrix_source = c->fov_source = still ? RL_SOURCE_ONE : RL_SOURCE_LIST;
+    c->n_matrix = c->n_fov = still ? 1 : n;
+    double shift[2] = {(g->probe.width / 2 - g->probe.camera.centre[0]) / g->probe.width,
+                       (g->probe.camera.centre[1] - g->probe.height / 2) / g->probe.width};
+    c->has_shift = fabs(shift[0]) > 1e-4 || fabs(shift[1]) > 1e-4;
+    for (int k = 0; k < 2; k++)
+        c->shift[k] = round(shift[k] * 1e5) / 1e5;
+    return RL_OK;
+}
+
+/* ---- comments --------------------------------------------------------------------------------------------
+ */
+
+static void say_camera(const guesser *g, rl_str *out)
+{
+    const rl_probe *p = &g->probe;
+    const rl_camera_spec *c = &g->m->camera;
+    if (p->solved && c->matrix_source != RL_SOURCE_HEADER) {
+        rl_str_printf(out, "#   camera: found from depth and %s, %.2g pixels off\n", g->position.names[0],
+                      p->camera.error);
+        return;
+    }
+    if (c->matrix_source == RL_SOURCE_HEADER && p->matrix_source)
+        rl_str_printf(out, "#   camera.matrix: the header has %s\n", p->matrix_source);
+    else if (c->matrix_source == RL_SOURCE_HEADER)
+        rl_str_add(
+            out,
+            "#   camera.matrix: the file does not say where the camera is. In place of `header` write 16 "
+            "numbers, world to camera,\n"
+            "#     rows listed, for column vectors; or render the world position, too, and inspect "
+            "finds the camera\n");
+    if (c->fov_source != RL_SOURCE_HEADER || !p->lens_source)
+        return;
+    if (!strcmp(p->lens_source, "screenWindowWidth") && p->lens_width == 1)
+        rl_str_add(out,
+                   "#   camera.fov_x: the file does not say it (screenWindowWidth is 1, what writers leave "
+                   "there). In place of `header` write degrees\n");
+    else
+        rl_str_printf(out, "#   camera.fov_x: the header has %s\n", p->lens_source);
+}
+
+static void say_depth(const guesser *g, rl_str *out)
+{
+    const rl_probe *p = &g->probe;
+    if (!(p->covered > 0))
+        return;
+    rl_str_printf(
+        out, "#   unit: depth goes from %.4g to %.4g, median %.4g, over %.0f %% of the picture; with `unit: ",
+        p->nearest, p->far, p->median, 100 * p->covered);
+    if (g->m->unit == 1)
+        rl_str_add(out, "m` these are metres\n");
+    else
+        rl_str_printf(out, "%g` the median is %.4g m\n", g->m->unit, p->median * g->m->unit);
+}
+
+static void say_normals(const guesser *g, rl_str *out)
+{
+    const rl_layer *normal = rl_manifest_layer(g->m, "normal"), *depth = rl_manifest_layer(g->m, "depth");
+    if (!g->probe.looked_at_normals || !normal || !depth)
+        return;
+    rl_str_add(out, "#   normal: ");
+    if (!rl_normal_check_advice(&g->probe.check, normal, depth, g->m->camera.forward_z, out))
+        rl_str_printf(out, "fits depth and camera, mean cosine %.3f at %zu smooth places",
+                      g->probe.check.cosine, g->probe.check.samples);
+    rl_str_add(out, "\n");
+}
+
+static void say_names(const guesser *g, rl_str *out)
+{
+    static const char *const care[RL_LAYER_COUNT] = {
+        [RL_LAYER_ALBEDO] = "the surface's colour, 0..1 and linear, without light",
+        [RL_LAYER_NORMAL] = "space, encoding and axes are what most renderers have",
+        [RL_LAYER_DEPTH] = "kind and empty are what most renderers have",
+    };
+    for (int i = 0; i < g->m->n_layers; i++) {
+        const rl_layer *l = &g->m->layers[i];
+        if (!(g->named & 1u << l->id))
+            continue;
+        if (!l->n_channels)
+            rl_str_add(out, "#   stencil: no channel is named like an id; so all is one material\n");
+        else
+            rl_str_printf(out, "#   %s: by its name alone%s%s\n", l->name, care[l->id] ? ": " : "",
+                          care[l->id] ? care[l->id] : "");
+    }
+}
+
+static rl_code say_preset(const guesser *g, rl_str *out, rl_error *err)
+{
+    rl_preset_words words;
+    if (!g->preset)
+        return RL_OK;
+    rl_code code = rl_preset_about(g->arena, rl_data_path(g->arena, "presets"), g->preset, &words, err);
+    for (size_t i = 0; i < words.n_check && !code; i++)
+        rl_str_printf(out, "#   %s\n", words.check[i]);
+    return code;
+}
+
+/* Required layers that are in no channel. */
+static void say_missing(const guesser *g, rl_str *out)
+{
+    int missing = 0;
+    for (int id = 0; id < RL_LAYER_COUNT; id++) {
+        const rl_layer_type *type = &rl_layer_types[id];
+        if (!type->required || rl_manifest_layer(g->m, type->name))
+            continue;
+        if (!missing++)
+            rl_str_add(
+                out,
+                "# relit cannot do without these, and no channel is named like them. Where one is, add it "
+                "to layers; else render it:\n");
+        rl_str_printf(out, "#   %s: {channels: [%s]%s}    # %s\n", type->name,
+                      type->channels == 1 ? "NAME" : "NAME.R, NAME.G, NAME.B",
+                      id == RL_LAYER_NORMAL  ? ", space: world, encoding: signed"
+                      : id == RL_LAYER_DEPTH ? ", kind: planar"
+                                             : "",
+                      type->help);
+    }
+}
+
+/* To be saved beside the files: their names in it are without a folder. */
+static rl_code print_manifest(const guesser *g, rl_str *out, rl_error *err)
+{
+    rl_manifest m = *g->m;
+    rl_pattern *patterns = rl_arena_array(g->arena, (size_t)m.n_patterns + 1, sizeof *patterns);
+    if (!patterns)
+        return rl_fail_memory(err, sizeof *patterns);
+    for (int i = 0; i < m.n_patterns; i++) {
+        patterns[i] = m.patterns[i];
+        patterns[i].path = rl_path_name(m.patterns[i].path);
+    }
+    m.patterns = patterns;
+    rl_manifest_print(&m, out);
+    return RL_OK;
+}
+
+static rl_code print_all(const guesser *g, rl_str *out, rl_error *err)
+{
+    const char *folder = rl_path_folder(g->arena, g->m->patterns[0].path);
+    if (!folder)
+        return rl_fail_memory(err, 64);
+    if (g->preset)
+        rl_str_printf(out, "# guessed by preset '%s'%s: ", g->preset, g->named ? " and by names" : "");
+    else
+        rl_str_add(out, "# no preset fits this file; guessed by names: ");
+    rl_str_printf(out, "check what follows, then save it as %s/capture.yaml\n", folder);
+    say_camera(g, out);
+    say_depth(g, out);
+    say_normals(g, out);
+    say_names(g, out);
+    rl_code code = say_preset(g, out, err);
+    if (!code)
+        code = print_manifest(g, out, err);
+    if (!code)
+        say_missing(g, out);
+    return code;
+}
+
+rl_code rl_inspect_guess(rl_tool *tool, const rl_capture *capture, rl_str *out, rl_error *err)
+{
+    guesser g = {.arena = tool->arena,
+                 .capture = capture,
+                 .m = capture->manifest,
+                 .preset = capture->missing ? NULL : capture->preset};
+    rl_exr *file = NULL;
+    rl_channel *channels = NULL;
+    char *path = rl_capture_first(tool->arena, capture->manifest, 0);
+    rl_code code = path ? rl_exr_open(path, 0, &file, err) : rl_fail_memory(err, 1);
+    if (!code)
+        code = rl_capture_channels(tool->arena, file, &channels, &g.n, err);
+    g.channels = channels;
+    if (!code && capture->missing)
+        code = make_manifest(&g, file, err);
+    if (!code && capture->missing)
+        code = rl_capture_name_ids(tool->arena, g.m, err);
+    g.positions = !code && rl_guess_layer(RL_LAYER_COUNT, channels, g.n, &g.position);
+    if (!code)
+        code = rl_probe_run(g.m, g.positions ? &g.position : NULL, tool->arena, &g.probe, err);
+    if (!code && g.probe.solved && !g.probe.matrix_source && g.m->camera.matrix_source == RL_SOURCE_HEADER)
+        code = set_cameras(&g, err);
+    if (!code && g.probe.solved && g.m->camera.matrix_source != RL_SOURCE_HEADER) {
+        rl_solved_camera found = g.probe.camera; /* once more, now that normals can be looked at */
+        code = rl_probe_run(g.m, NULL, tool->arena, &g.probe, err);
+        g.probe.solved = true;
+        g.probe.camera = found;
+    }
+    if (!code)
+        code = print_all(&g, out, err);
+    rl_exr_close(&file);
+    return code;
+}

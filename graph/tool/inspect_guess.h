@@ -1,0 +1,12 @@
+/* The manifest that `relit inspect` proposes for files without one. */
+#ifndef RL_TOOL_INSPECT_GUESS_H
+#define RL_TOOL_INSPECT_GUESS_H
+
+#include "graph/tool/capture.h"
+#include "graph/tool/tool.h"
+
+/* `capture` is a bare file or pattern. What is printed reads back as a manifest, with comments that say what
+ * was found, what to check, and what is missing. */
+rl_code rl_inspect_guess(rl_tool *tool, const rl_capture *capture, rl_str *out, rl_error *err);
+
+#endif

@@ -1,0 +1,179 @@
+#include "graph/tool/probe.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "graph/base/alloc.h"
+#include "graph/run/camera_header.h"
+#include "graph/run/ingest.h"
+#include "graph/tool/capture.h"
+
+enum { SIDE = 64 };
+
+/* The file, and planes of its data window. */
+typedef struct looked {
+    const rl_manifest *m;
+    rl_exr *file;
+    int part; /* that holds depth */
+    size_t width, height;
+    float *depth, *normal[3], *position[3];
+} looked;
+
+static rl_code read_planes(looked *l, const char *part, const char *const *names, int n, float **out,
+                           rl_error *err)
+{
+    const char *path = rl_exr_path(l->file);
+    int p = -1;
+    for (int k = 0; k < rl_exr_parts(l->file) && p < 0; k++)
+        if ((!part || !strcmp(part, rl_exr_part_at(l->file, k)->name)) &&
+            rl_exr_channel_named(rl_exr_part_at(l->file, k), names[0]))
+            p = k;
+    const rl_exr_part *info = p < 0 ? NULL : rl_exr_part_at(l->file, p);
+    if (!info)
+        return rl_fail_file(err, RL_E_FORMAT, path, "there is no channel '%s'", names[0]);
+    if (!l->width) {
+        l->part = p;
+        l->width = (size_t)info->width;
+        l->height = (size_t)info->height;
+    }
+    if ((size_t)info->width != l->width || (size_t)info->height != l->height)
+        return rl_fail_file(err, RL_E_FORMAT, path, "channel '%s' has another size than the depth", names[0]);
+    rl_exr_plane planes[3];
+    for (int k = 0; k < n; k++) {
+        out[k] = rl_calloc(l->width * l->height, sizeof *out[k]);
+        if (!out[k])
+            return rl_fail_memory(err, l->width * l->height * sizeof *out[k]);
+        planes[k] = (rl_exr_plane){.channel = names[k],
+                                   .floats = out[k],
+                                   .stride = l->width,
+                                   .replace_inf = true,
+                                   .inf_value = 3e38f};
+    }
+    return rl_exr_read(l->file, p, planes, (size_t)n, NULL, NULL, err);
+}
+
+static int by_value(const void *a, const void *b)
+{
+    float x = *(const float *)a, y = *(const float *)b;
+    return (x > y) - (x < y);
+}
+
+static rl_code look_at_depth(const looked *l, const rl_layer *layer, rl_probe *out, rl_error *err)
+{
+    size_t pixels = l->width * l->height, n = 0;
+    float *sorted = rl_malloc((pixels + 1) * sizeof *sorted);
+    if (!sorted)
+        return rl_fail_memory(err, pixels * sizeof *sorted);
+    for (size_t i = 0; i < pixels; i++)
+        if (!rl_layer_is_empty(layer, (double)l->depth[i]) && l->depth[i] < 1e30f)
+            sorted[n++] = l->depth[i];
+    qsort(sorted, n, sizeof *sorted, by_value);
+    out->covered = pixels ? (double)n / (double)pixels : 0;
+    if (n) {
+        out->nearest = (double)sorted[0];
+        out->median = (double)sorted[n / 2];
+        out->far = (double)sorted[n - 1];
+    }
+    rl_free(sorted);
+    return RL_OK;
+}
+
+/* The camera of the first frame as a run would take it, when there is one. */
+static bool find_camera(const looked *l, rl_probe *out, camera_t *camera)
+{
+    rl_camera_info info;
+    rl_camera_lens lens;
+    bool jitter;
+    double header[16];
+    rl_error ignored = {0};
+    int frame = l->m->frames.n ? l->m->frames.numbers[0] : 1;
+    rl_code code = rl_camera_read(l->m, frame, l->file, l->part, &info, &lens, &jitter, &ignored);
+    out->matrix_source = rl_camera_header_matrix(l->file, l->part, l->m->camera.forward_z, header);
+    out->lens_source = lens.source;
+    out->lens_width = lens.width;
+    out->width = info.display[2];
+    out->height = info.display[3];
+    return !code && !rl_camera_make(&info, camera, &ignored);
+}
+
+static void look_at_normals(looked *l, const rl_layer *depth, const rl_layer *normal, const camera_t *camera,
+                            rl_probe *out)
+{
+    const rl_exr_box w = rl_exr_part_at(l->file, l->part)->data_window;
+    rl_rows rows = {.width = (int)l->width, .y1 = (int)l->height, .stride = l->width};
+    rl_ingest_depth how = {.layer = depth, .camera = camera, .x = w.x0, .y = w.y0};
+    rl_ingest_depth_rows(l->depth, rows, &how);
+    float m[9];
+    rl_ingest_normal turn = {.encoding = normal->encoding,
+                             .rotate = rl_ingest_normal_matrix(normal, camera, l->m->camera.forward_z, m)};
+    rl_ingest_normal_rows(l->normal, rows, &turn);
+    rl_normal_view view = {.depth = l->depth,
+                           .normal = {l->normal[0], l->normal[1], l->normal[2]},
+                           .stride = l->width,
+                           .width = (int)l->width,
+                           .height = (int)l->height,
+                           .x = w.x0,
+                           .y = w.y0,
+                           .camera = camera};
+    rl_normal_check_run(&view, normal, depth, l->m->camera.forward_z, &out->check);
+    out->looked_at_normals = out->check.samples > 0;
+}
+
+/* Before the depth is converted. */
+static void look_at_positions(const looked *l, const rl_layer *depth, rl_probe *out)
+{
+    const rl_exr_box w = rl_exr_part_at(l->file, l->part)->data_window;
+    rl_seen *seen = rl_malloc(SIDE * SIDE * sizeof *seen);
+    size_t n = 0;
+    for (size_t i = 0; seen && i < SIDE * SIDE; i++) {
+        size_t x = (2 * (i % SIDE) + 1) * l->width / (2 * SIDE),
+               y = (2 * (i / SIDE) + 1) * l->height / (2 * SIDE);
+        size_t at = y * l->width + x;
+        double d = (double)l->depth[at];
+        if (rl_layer_is_empty(depth, d) || d > 1e30)
+            continue;
+        seen[n] = (rl_seen){.x = w.x0 + (double)x + 0.5, .y = w.y0 + (double)y + 0.5, .depth = d};
+        for (int k = 0; k < 3; k++)
+            seen[n].world[k] = (double)l->position[k][at];
+        n++;
+    }
+    out->solved = seen && rl_camera_solve(seen, n, &out->camera) && out->camera.error < 0.5 &&
+                  fabs(out->camera.aspect - 1) < 0.01;
+    rl_free(seen);
+}
+
+rl_code rl_probe_run(const rl_manifest *m, const rl_guess *position, rl_arena *arena, rl_probe *out,
+                     rl_error *err)
+{
+    const rl_layer *depth = rl_manifest_layer(m, "depth"), *normal = rl_manifest_layer(m, "normal");
+    looked l = {.m = m};
+    camera_t camera;
+    *out = (rl_probe){0};
+    char *path = rl_capture_first(arena, m, depth ? depth->pattern : 0);
+    rl_code code = path ? rl_exr_open(path, 0, &l.file, err) : rl_fail_memory(err, 1);
+    if (!code && !depth) {
+        find_camera(&l, out, &camera);
+        rl_exr_close(&l.file);
+        return RL_OK;
+    }
+    if (!code)
+        code = read_planes(&l, depth->part, depth->channels, 1, &l.depth, err);
+    if (!code && normal)
+        code = read_planes(&l, normal->part, normal->channels, normal->n_channels, l.normal, err);
+    if (!code && position)
+        code = read_planes(&l, position->part, position->names, 3, l.position, err);
+    if (!code)
+        code = look_at_depth(&l, depth, out, err);
+    if (!code && position)
+        look_at_positions(&l, depth, out);
+    if (!code && find_camera(&l, out, &camera) && normal && l.normal[2])
+        look_at_normals(&l, depth, normal, &camera, out);
+    rl_free(l.depth);
+    for (int k = 0; k < 3; k++) {
+        rl_free(l.normal[k]);
+        rl_free(l.position[k]);
+    }
+    rl_exr_close(&l.file);
+    return code;
+}
