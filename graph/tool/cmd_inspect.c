@@ -61,7 +61,20 @@ static void print_attributes(const rl_exr *file, int part, rl_str *out)
     }
 }
 
-static rl_code print_file(const char *path, rl_str *out, rl_error *err)
+/* What files hold is a comment of the manifest that follows: so all that is printed can be saved as one. */
+static void add_comment(const rl_str *text, rl_str *out)
+{
+    const char *line = rl_str_text(text);
+    while (*line) {
+        size_t n = strcspn(line, "\n");
+        rl_str_add(out, n ? "# " : "#");
+        rl_str_addn(out, line, n);
+        rl_str_add(out, "\n");
+        line += n + (line[n] == '\n');
+    }
+}
+
+static rl_code list_file(const char *path, rl_str *out, rl_error *err)
 {
     rl_exr *file = NULL;
     rl_code code = rl_exr_open(path, 0, &file, err);
@@ -84,6 +97,18 @@ static rl_code print_file(const char *path, rl_str *out, rl_error *err)
     }
     rl_exr_close(&file);
     return RL_OK;
+}
+
+static rl_code print_file(const char *path, rl_str *out, rl_error *err)
+{
+    rl_str text = {0};
+    rl_code code = list_file(path, &text, err);
+    if (!code && text.failed)
+        code = rl_fail_memory(err, text.room);
+    if (!code)
+        add_comment(&text, out);
+    rl_str_free(&text);
+    return code;
 }
 
 /* ---- how relit would read it ----------------------------------------------------------------------------
@@ -180,9 +205,15 @@ static rl_code print_folder(rl_tool *tool, const char *folder, rl_str *out, rl_e
     if (!code && !n)
         code = rl_fail_file(err, RL_E_IO, folder, "the folder holds no capture.yaml and no EXR file");
     for (size_t i = 0; !code && i < n; i++) {
-        rl_str_printf(out, "%s%s\n", i ? "\n" : "", patterns[i]);
+        rl_str_printf(out, "%s# %s\n", i ? "\n" : "", patterns[i]);
         code = print_capture(tool, patterns[i], out, err);
     }
+    if (!code && n > 1)
+        rl_str_add(
+            out,
+            "\n# Several sequences. Where each holds other layers of the same frames, write one manifest for "
+            "all of them, with\n"
+            "#   files: {normal: n.####.exr, depth: z.####.exr, default: beauty.####.exr}\n");
     return code;
 }
 
