@@ -236,7 +236,7 @@ static void test_bad(void **state)
         {"unit: -1\n", "1:7: error: 'unit' is -1: out of range, above 0"},
         {"camera: {forwards: -z}\n",
          "1:10: error: camera has no key 'forwards'; did you mean 'forward'? known: "
-         "forward, fov_x, jitter, matrix"},
+         "forward, fov_x, jitter, matrix, shift"},
         {"camera: {forward: z}\n", "1:19: error: 'forward' cannot be 'z'; did you mean '-z'? known: "
                                    "+z, -z"},
         {"camera: {fov_x: 180}\n", "1:17: error: 'fov_x' is 180: out of range, 0.001 to 179.9"},

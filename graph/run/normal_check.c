@@ -174,9 +174,10 @@ void rl_normal_check_run(const rl_normal_view *v, const rl_layer *normal, const 
     for (int i = 0; i < 48; i++) {
         int axes[3];
         order(i, axes);
-        if (!world || !is_plain(axes))
+        bool stated = !memcmp(axes, normal->axes, sizeof axes);
+        if (!world || !stated)
             consider(out, mean(s.world, axes, s.n), !world, false, axes);
-        if (world || !is_plain(axes))
+        if (world || !stated)
             consider(out, mean(s.view, axes, s.n), world, false, axes);
         if (is_plain(axes))
             consider(out, mean(s.turned, axes, s.n), !world, true, axes);
@@ -217,16 +218,19 @@ bool rl_normal_check_advice(const rl_normal_check *c, const rl_layer *normal, co
 {
     bool better = c->best > 0.85 && c->best > c->cosine + 0.1;
     bool bent = 1 - c->radial < 0.6 * (1 - c->cosine) && c->cosine < 0.998;
-    if (c->samples < FEWEST || (c->cosine >= 0.5 && !(c->cosine < 0.85 && better) && !bent))
+    bool halved =
+        c->positive && normal->encoding == RL_ENCODING_SIGNED && c->cosine < 0.95; /* 0..1 as -1..1 */
+    bool wrong = c->cosine < 0.5 || (c->cosine < 0.85 && better);
+    if (c->samples < FEWEST || !(wrong || bent || halved))
         return false;
     rl_str_printf(out,
                   "normals and depth do not fit each other: at %zu smooth places their mean cosine is %.2f; ",
                   c->samples, c->cosine);
-    if (c->cosine >= 0.5 && bent && !better) {
+    if (halved) {
+        rl_str_add(out, "none has a negative component: layers.normal.encoding: unsigned in the manifest?");
+    } else if (!wrong) {
         rl_str_printf(out, "it is %.3f with layers.depth.kind: %s in the manifest", c->radial,
                       depth->kind == RL_DEPTH_RADIAL ? "planar" : "radial");
-    } else if (c->positive && normal->encoding == RL_ENCODING_SIGNED) {
-        rl_str_add(out, "none has a negative component: layers.normal.encoding: unsigned in the manifest?");
     } else if (better) {
         rl_str_printf(out, "it is %.2f with ", c->best);
         add_best(c, normal, forward_z, out);

@@ -1,0 +1,315 @@
+/* Captures of other renderers: what inspect proposes for them is saved and run as it is, and has to give the
+ * picture that relit's own capture of the same scene gives. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <cmocka.h>
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "tests/foreign_scene.h"
+#include "tests/tool_run.h"
+
+#define RUN(...) tool_run((const char *const[]){__VA_ARGS__, NULL})
+
+static void expect(const tool_result *r, int status)
+{
+    if (r->status != status)
+        print_error("status %d instead of %d\n%s%s\n", r->status, status, r->out, r->err);
+    assert_int_equal(r->status, status);
+}
+
+static void has(const char *text, const char *what)
+{
+    if (!strstr(text, what))
+        print_error("no '%s' in:\n%s\n", what, text);
+    assert_non_null(strstr(text, what));
+}
+
+/* A folder with one frame, and what inspect makes of it in its capture.yaml. */
+static char *make(foreign_kind kind, double shift, char **manifest)
+{
+    char *folder = folder_new(), *file = path_in(folder, "shot.0007.exr");
+    foreign_scene *s = foreign_scene_new(shift);
+    foreign_write(file, s, kind);
+    tool_result r = RUN("inspect", folder);
+    expect(&r, 0);
+    file_write(folder, "capture.yaml", r.out, strlen(r.out)); /* `relit inspect DIR > DIR/capture.yaml` */
+    *manifest = strdup(r.out);
+    tool_result_free(&r);
+    free(file);
+    free(s);
+    return folder;
+}
+
+/* Relights it with one lamp and reads R, G, B. Any warning fails. */
+static float *relight(const char *folder, foreign_kind kind)
+{
+    const double lamp[3] = {-1.2, -1.5, 1.9};
+    double at[3];
+    char text[640];
+    foreign_point(kind, lamp, at);
+    snprintf(text, sizeof text,
+             "relit: 1\ncapture: capture.yaml\nshading: {diffuse: lambert, specular: none}\nmaterials: "
+             "{default: {}}\n"
+             "lights: {lamp: {type: point, position: [%.9g, %.9g, %.9g], intensity: 5, shadow: none}}\n"
+             "graph:\n  light: {pass: lighting}\n"
+             "  c: {pass: combine, in: {diffuse: light.diffuse, lit: light.lit}}\n"
+             "outputs: {p: {image: c.color, file: p.exr, type: float}}\n",
+             at[0], at[1], at[2]);
+    file_write(folder, "p.yaml", text, strlen(text));
+    char *pipe = path_in(folder, "p.yaml"), *out = path_in(folder, "out"), *picture = path_in(out, "p.exr");
+    tool_result r = RUN("run", pipe, "--out", out, "--quiet");
+    expect(&r, 0);
+    assert_string_equal(r.err, "");
+    tool_result_free(&r);
+    float *pixels = calloc(3 * FOREIGN_PIXELS, sizeof *pixels);
+    rl_exr *file = NULL;
+    rl_error err = {0};
+    assert_non_null(pixels);
+    assert_int_equal(rl_exr_open(picture, 0, &file, &err), RL_OK);
+    rl_exr_plane planes[3];
+    for (int i = 0; i < 3; i++)
+        planes[i] = (rl_exr_plane){.channel = (const char *[]){"R", "G", "B"}[i],
+                                   .floats = pixels + i * FOREIGN_PIXELS,
+                                   .stride = FOREIGN_WIDTH};
+    assert_int_equal(rl_exr_read(file, 0, planes, 3, NULL, NULL, &err), RL_OK);
+    rl_exr_close(&file);
+    free(pipe);
+    free(picture);
+    free(out);
+    return pixels;
+}
+
+static void expect_same(const float *a, const float *b, double tolerance)
+{
+    double worst = 0, most = 0;
+    for (int k = 0; k < 3 * FOREIGN_PIXELS; k++) {
+        worst = fmax(worst, fabs((double)a[k] - (double)b[k]));
+        most = fmax(most, (double)b[k]);
+    }
+    assert_true(most > 0.05);
+    if (worst > tolerance * most)
+        fail_msg("the pictures differ by %g of %g", worst, most);
+}
+
+static float *truth(void)
+{
+    char *manifest, *folder = make(FOREIGN_RELIT, 0, &manifest);
+    has(manifest, "# guessed by preset 'relit'");
+    float *pixels = relight(folder, FOREIGN_RELIT);
+    free(manifest);
+    folder_remove(folder);
+    return pixels;
+}
+
+/* The proposal is right as it is, and says `words` (ending with NULL). */
+static void expect_right(foreign_kind kind, const char *const *words)
+{
+    char *manifest, *folder = make(kind, 0, &manifest);
+    for (; *words; words++)
+        has(manifest, *words);
+    float *want = truth(), *got = relight(folder, kind);
+    expect_same(got, want, 2e-4);
+    free(want);
+    free(got);
+    free(manifest);
+    folder_remove(folder);
+}
+
+static void test_blender(void **state)
+{
+    (void)state;
+    expect_right(FOREIGN_BLENDER,
+                 (const char *[]){"# guessed by preset 'blender_cryptomatte'",
+                                  "camera: found from depth and L.Position.X", "fov_x: 45.83662",
+                                  "normal: fits depth and camera", "encoding: cryptomatte",
+                                  "stencil_names: {317341308: \"red ball\", 3410176152: floor}", NULL});
+}
+
+static void test_arnold(void **state)
+{
+    (void)state;
+    expect_right(FOREIGN_ARNOLD,
+                 (const char *[]){"# guessed by preset 'arnold'",
+                                  "camera.matrix: the header has worldToCamera",
+                                  "camera.fov_x: the header has worldToNDC", "forward: +z", NULL});
+}
+
+static void test_unreal(void **state)
+{
+    (void)state;
+    expect_right(FOREIGN_UNREAL,
+                 (const char *[]){"# guessed by preset 'unreal'", "unit: 0.01", "encoding: unsigned",
+                                  "camera.matrix: the header has unreal/",
+                                  "stencil_names: {317341308: \"red ball\"", NULL});
+}
+
+static void test_pbrt(void **state)
+{
+    (void)state;
+    expect_right(FOREIGN_PBRT, (const char *[]){"# guessed by preset 'pbrt'", "stencil: {constant: 1}",
+                                                "depth: {channels: [P.Z]", "space: camera", NULL});
+}
+
+static void test_vray(void **state)
+{
+    (void)state;
+    expect_right(FOREIGN_VRAY,
+                 (const char *[]){"# guessed by preset 'vray'",
+                                  "camera.matrix: the header has cameraTransform",
+                                  "camera.fov_x: the header has cameraFov", "normal: V-Ray's Normals", NULL});
+}
+
+static void test_unknown(void **state)
+{
+    (void)state;
+    expect_right(FOREIGN_UNKNOWN,
+                 (const char *[]){"# no preset fits this file; guessed by names", "albedo: by its name alone",
+                                  "stencil: no channel is named like an id", "forward: +z", "[zdepth]",
+                                  NULL});
+}
+
+/* The lens's shift is in Arnold's worldToNDC, and in what Blender's positions tell. */
+static void test_shift(void **state)
+{
+    (void)state;
+    char *manifest, *arnold = make(FOREIGN_ARNOLD, 0.06, &manifest);
+    free(manifest);
+    char *blender = make(FOREIGN_BLENDER, 0.06, &manifest);
+    has(manifest, "shift: [0.06, 0]");
+    free(manifest);
+    float *a = relight(arnold, FOREIGN_ARNOLD), *b = relight(blender, FOREIGN_BLENDER), *straight = truth();
+    expect_same(a, b, 2e-4);
+    double differ = 0;
+    for (int k = 0; k < 3 * FOREIGN_PIXELS; k++)
+        differ = fmax(differ, fabs((double)a[k] - (double)straight[k]));
+    assert_true(differ > 0.01);
+    free(a);
+    free(b);
+    free(straight);
+    folder_remove(arnold);
+    folder_remove(blender);
+}
+
+/* ---- what is wrong is said --------------------------------------------------------------------------------
+ */
+
+/* The manifest of relit's own capture with one thing changed; the run warns with these words. */
+static void expect_warning(foreign_kind kind, const char *find, const char *put, const char *words)
+{
+    char *manifest, *folder = make(kind, 0, &manifest), *wrong = text_replace(manifest, find, put);
+    file_write(folder, "capture.yaml", wrong, strlen(wrong));
+    static const char text[] = "relit: 1\ncapture: capture.yaml\nmaterials: {default: {}}\n"
+                               "lights: {l: {type: point, position: [0, 0, 1], intensity: 1, shadow: none}}\n"
+                               "graph:\n  light: {pass: lighting}\n"
+                               "  c: {pass: combine, in: {diffuse: light.diffuse, lit: light.lit}}\n"
+                               "outputs: {p: {image: c.color, file: p.exr}}\n";
+    file_write(folder, "p.yaml", text, strlen(text));
+    char *pipe = path_in(folder, "p.yaml"), *out = path_in(folder, "out");
+    tool_result r = RUN("run", pipe, "--out", out, "--quiet");
+    expect(&r, 0);
+    if (words)
+        has(r.err, words);
+    else
+        assert_string_equal(r.err, "");
+    tool_result_free(&r);
+    free(pipe);
+    free(out);
+    free(wrong);
+    free(manifest);
+    folder_remove(folder);
+}
+
+static void test_conventions(void **state)
+{
+    (void)state;
+    expect_warning(FOREIGN_RELIT, NULL, "", NULL);
+    expect_warning(FOREIGN_RELIT, "space: world", "space: camera",
+                   "with layers.normal.space: world in the manifest");
+    expect_warning(FOREIGN_RELIT, "forward: -z", "forward: +z", "with camera.forward: -z in the manifest");
+    expect_warning(FOREIGN_RELIT, "encoding: signed", "encoding: signed, axes: [x, z, -y]",
+                   "with layers.normal.axes: [x, y, z] in the manifest");
+    expect_warning(FOREIGN_RELIT, "kind: planar", "kind: radial",
+                   "with layers.depth.kind: planar in the manifest");
+    expect_warning(FOREIGN_PBRT, "space: camera", "space: world",
+                   "with layers.normal.space: camera in the manifest");
+    expect_warning(FOREIGN_PBRT, "encoding: signed", "encoding: signed, axes: [x, -y, z]",
+                   "with layers.normal.axes: [x, y, z] in the manifest");
+    expect_warning(FOREIGN_UNREAL, "encoding: unsigned", "encoding: signed",
+                   "layers.normal.encoding: unsigned in the manifest?");
+}
+
+static void expect_failure(const char *find, const char *put, int status, const char *words)
+{
+    char *manifest, *folder = make(FOREIGN_BLENDER, 0, &manifest), *wrong = text_replace(manifest, find, put);
+    file_write(folder, "capture.yaml", wrong, strlen(wrong));
+    char *out = path_in(folder, "out"), *pipe = path_in(folder, "p.yaml");
+    tool_result r = RUN("init", folder);
+    if (!r.status) {
+        file_write(folder, "p.yaml", r.out, strlen(r.out));
+        char *path = text_replace(r.out, folder, "capture.yaml");
+        file_write(folder, "p.yaml", path, strlen(path));
+        free(path);
+        tool_result_free(&r);
+        r = RUN("run", pipe, "--out", out, "--quiet");
+    }
+    expect(&r, status);
+    has(r.err, words);
+    tool_result_free(&r);
+    free(out);
+    free(pipe);
+    free(wrong);
+    free(manifest);
+    folder_remove(folder);
+}
+
+static void test_messages(void **state)
+{
+    (void)state;
+    expect_failure(", encoding: cryptomatte", "", 1, "Cryptomatte needs encoding: cryptomatte");
+    expect_failure("encoding: cryptomatte", "encoding: cryptomatt", 2,
+                   "known: cryptomatte, integer");
+    expect_failure("{channels: [L.CryptoMaterial00.r], encoding", "{constant: 1, encoding", 2,
+                   "'constant' is the id of every pixel, instead of channels");
+    expect_failure("encoding: signed", "encoding: signed, axes: [x, y, y]", 2,
+                   "'axes': expected three of x, y, z");
+    expect_failure("encoding: signed", "encoding: signed, axes: [x, y]", 2,
+                   "'axes': expected three of x, y, z");
+}
+
+/* Steps that a newcomer takes before there is a manifest. */
+static void test_first_steps(void **state)
+{
+    (void)state;
+    char *folder = folder_new(), *file = path_in(folder, "shot.0007.exr");
+    foreign_scene *s = foreign_scene_new(0);
+    foreign_write(file, s, FOREIGN_BLENDER);
+    tool_result r = RUN("init", folder);
+    expect(&r, 2);
+    has(r.err, "the folder holds no capture.yaml; `relit inspect ");
+    tool_result_free(&r);
+    r = RUN("init", file);
+    expect(&r, 2);
+    has(r.err, "the file does not say where its camera is; `relit inspect ");
+    tool_result_free(&r);
+    free(s);
+    free(file);
+    folder_remove(folder);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_blender),  cmocka_unit_test(test_arnold),
+        cmocka_unit_test(test_unreal),   cmocka_unit_test(test_pbrt),
+        cmocka_unit_test(test_vray),     cmocka_unit_test(test_unknown),
+        cmocka_unit_test(test_shift),    cmocka_unit_test(test_conventions),
+        cmocka_unit_test(test_messages), cmocka_unit_test(test_first_steps),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
