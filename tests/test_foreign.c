@@ -272,8 +272,7 @@ static void test_messages(void **state)
 {
     (void)state;
     expect_failure(", encoding: cryptomatte", "", 1, "Cryptomatte needs encoding: cryptomatte");
-    expect_failure("encoding: cryptomatte", "encoding: cryptomatt", 2,
-                   "known: cryptomatte, integer");
+    expect_failure("encoding: cryptomatte", "encoding: cryptomatt", 2, "known: cryptomatte, integer");
     expect_failure("{channels: [L.CryptoMaterial00.r], encoding", "{constant: 1, encoding", 2,
                    "'constant' is the id of every pixel, instead of channels");
     expect_failure("encoding: signed", "encoding: signed, axes: [x, y, y]", 2,

@@ -271,9 +271,10 @@ static void test_bad(void **state)
          "2:26: error: stencil_names: the id 0x1 is named twice"},
         {"preset: blander\n",
          "1:9: error: there is no preset 'blander'; did you mean 'blender'? known: arnold, "
-         "blender, relit"},
+         "arnold_cryptomatte, blender, blender_cryptomatte, pbrt, relit, unreal, vray"},
         {"preset: ../presets/blender\n",
-         "1:9: error: there is no preset '../presets/blender'; known: arnold, blender, relit"},
+         "1:9: error: there is no preset '../presets/blender'; known: arnold, arnold_cryptomatte, blender, "
+         "blender_cryptomatte, pbrt, relit, unreal, vray"},
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++)
         refuse(with("%s%s", rows[i].text, layers), with("shots/capture.yaml:%s", rows[i].expected));

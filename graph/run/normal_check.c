@@ -217,7 +217,7 @@ bool rl_normal_check_advice(const rl_normal_check *c, const rl_layer *normal, co
                             bool forward_z, rl_str *out)
 {
     bool better = c->best > 0.85 && c->best > c->cosine + 0.1;
-    bool bent = 1 - c->radial < 0.6 * (1 - c->cosine) && c->cosine < 0.998;
+    bool bent = depth->kind != RL_DEPTH_DEVICE && c->cosine < 0.998 && 1 - c->radial < 0.6 * (1 - c->cosine);
     bool halved =
         c->positive && normal->encoding == RL_ENCODING_SIGNED && c->cosine < 0.95; /* 0..1 as -1..1 */
     bool wrong = c->cosine < 0.5 || (c->cosine < 0.85 && better);
