@@ -377,8 +377,8 @@ static void test_camera(void **state)
     assert_true(rl_manifest_jitter(m, 1)[1] == -0.5 && rl_manifest_jitter(m, 2)[0] == 0);
     assert_int_equal(rl_manifest_view(m, 1, NULL, out, &err), RL_E_FORMAT);
     assert_message("shots/capture.yaml:4:9: error: frame 1: the file has no attribute worldToCamera; give "
-                   "camera.matrix: 16 numbers, world to camera, rows listed, for column vectors (recipes: "
-                   "configs/README.md, Your own capture)");
+                   "camera.matrix: 16 numbers, world to camera, rows listed, for column vectors (how to get "
+                   "them: configs/captures.md)");
     float scaled[16], transposed[16];
     for (int i = 0; i < 16; i++) {
         scaled[i] = i < 12 ? header[i] * 0.01f : header[i];

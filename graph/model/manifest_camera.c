@@ -141,7 +141,7 @@ rl_code rl_manifest_view(const rl_manifest *m, int frame, const float *header, d
         return rl_fail(
             err, RL_E_FORMAT, c->where,
             "frame %d: the file has no attribute worldToCamera; give camera.matrix: 16 numbers, world to "
-            "camera, rows listed, for column vectors (recipes: configs/README.md, Your own capture)",
+            "camera, rows listed, for column vectors (how to get them: configs/captures.md)",
             frame);
     for (int i = 0; i < 16; i++) /* the header's is for row vectors: its transpose */
         w[i] = c->matrix_source == RL_SOURCE_HEADER ? (double)header[4 * (i % 4) + i / 4]
