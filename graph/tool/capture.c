@@ -22,17 +22,18 @@ char *rl_capture_first(rl_arena *arena, const rl_manifest *m, int pattern)
 
 rl_code rl_capture_channels(rl_arena *arena, const rl_exr *file, rl_channel **out, size_t *n, rl_error *err)
 {
+    size_t room = 0;
     *n = 0;
     for (int p = 0; p < rl_exr_parts(file); p++)
-        *n += rl_exr_part_at(file, p)->n_channels;
-    *out = rl_arena_array(arena, *n + 1, sizeof **out);
+        room += rl_exr_part_at(file, p)->n_channels;
+    *out = rl_arena_array(arena, room + 1, sizeof **out);
     if (!*out)
-        return rl_fail_memory(err, *n * sizeof **out);
-    rl_channel *at = *out;
+        return rl_fail_memory(err, room * sizeof **out);
     for (int p = 0; p < rl_exr_parts(file); p++) {
         const rl_exr_part *part = rl_exr_part_at(file, p);
-        for (size_t i = 0; i < part->n_channels; i++)
-            *at++ = (rl_channel){part->name, part->channels[i].name};
+        for (size_t i = 0; i < part->n_channels && !part->deep; i++)
+            if (part->channels[i].x_sampling == 1 && part->channels[i].y_sampling == 1)
+                (*out)[(*n)++] = (rl_channel){part->name, part->channels[i].name};
     }
     return RL_OK;
 }
@@ -64,7 +65,8 @@ static rl_code find_bare(rl_arena *arena, const char *path, const char *presets,
     if (!code && !out->missing)
         code = rl_manifest_bind(arena, out->manifest, 0, first, channels, n, err);
     if (!code && !out->missing)
-        code = rl_capture_name_ids(arena, out->manifest, err);
+        rl_capture_name_ids(arena, out->manifest,
+                            &(rl_error){0}); /* names are no must: a run says what is wrong */
 done:
     rl_exr_close(&file);
     return code;

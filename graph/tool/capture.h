@@ -20,7 +20,8 @@ rl_code rl_capture_find(rl_arena *arena, const char *path, const rl_log *log, rl
 /* The file of a pattern of the manifest at its first frame; NULL when memory is out. */
 char *rl_capture_first(rl_arena *arena, const rl_manifest *m, int pattern);
 
-/* All channels of an open file; their names live as long as the file. */
+/* The channels of an open file that relit can read (no deep parts, no subsampling); their names live as long
+ * as the file. */
 rl_code rl_capture_channels(rl_arena *arena, const rl_exr *file, rl_channel **out, size_t *n, rl_error *err);
 
 /* Gives the ids of the first frame the names that the file has for them (Cryptomatte), when the manifest has

@@ -86,7 +86,7 @@ static rl_code list_file(const char *path, rl_str *out, rl_error *err)
         rl_str_printf(out, "  part %d", p);
         if (*part->name)
             rl_str_printf(out, " '%s'", part->name);
-        rl_str_printf(out, ": %s%s, %s compression\n", part->deep ? "deep " : "",
+        rl_str_printf(out, ": %s%s, %s compression\n", part->deep ? "deep (relit cannot read it) " : "",
                       part->tiled ? "tiled" : "scanline", rl_exr_compression_name(part->compression));
         if (part->tiled)
             rl_str_printf(out, "    tiles of %d x %d\n", part->tile_width, part->tile_height);

@@ -23,6 +23,7 @@ typedef struct guesser {
     bool positions;
     rl_guess position;
     rl_probe probe;
+    rl_error unread; /* why the pixels could not be looked at */
 } guesser;
 
 /* ---- layers ----------------------------------------------------------------------------------------------
@@ -276,6 +277,8 @@ static rl_code print_all(const guesser *g, rl_str *out, rl_error *err)
     else
         rl_str_add(out, "# no preset fits this file; guessed by names: ");
     rl_str_printf(out, "check what follows, then save it as %s/capture.yaml\n", folder);
+    if (g->unread.code)
+        rl_str_printf(out, "#   the first frame's pixels cannot be looked at: %s\n", g->unread.text);
     say_camera(g, out);
     say_depth(g, out);
     say_normals(g, out);
@@ -286,6 +289,23 @@ static rl_code print_all(const guesser *g, rl_str *out, rl_error *err)
     if (!code)
         say_missing(g, out);
     return code;
+}
+
+/* What the pixels tell; when they cannot be read, that is all that they tell. */
+static void look(guesser *g)
+{
+    rl_error *err = &g->unread;
+    g->positions = rl_guess_layer(RL_LAYER_COUNT, g->channels, g->n, &g->position);
+    rl_code code = rl_probe_run(g->m, g->positions ? &g->position : NULL, g->arena, &g->probe, err);
+    if (code || !g->probe.solved || g->probe.matrix_source || g->m->camera.matrix_source != RL_SOURCE_HEADER)
+        return;
+    code = set_cameras(g, err);
+    if (code || !g->probe.solved)
+        return;
+    rl_solved_camera found = g->probe.camera; /* once more, now that normals can be looked at */
+    rl_probe_run(g->m, NULL, g->arena, &g->probe, err);
+    g->probe.solved = true;
+    g->probe.camera = found;
 }
 
 rl_code rl_inspect_guess(rl_tool *tool, const rl_capture *capture, rl_str *out, rl_error *err)
@@ -304,18 +324,9 @@ rl_code rl_inspect_guess(rl_tool *tool, const rl_capture *capture, rl_str *out, 
     if (!code && capture->missing)
         code = make_manifest(&g, file, err);
     if (!code && capture->missing)
-        code = rl_capture_name_ids(tool->arena, g.m, err);
-    g.positions = !code && rl_guess_layer(RL_LAYER_COUNT, channels, g.n, &g.position);
+        rl_capture_name_ids(tool->arena, g.m, &(rl_error){0});
     if (!code)
-        code = rl_probe_run(g.m, g.positions ? &g.position : NULL, tool->arena, &g.probe, err);
-    if (!code && g.probe.solved && !g.probe.matrix_source && g.m->camera.matrix_source == RL_SOURCE_HEADER)
-        code = set_cameras(&g, err);
-    if (!code && g.probe.solved && g.m->camera.matrix_source != RL_SOURCE_HEADER) {
-        rl_solved_camera found = g.probe.camera; /* once more, now that normals can be looked at */
-        code = rl_probe_run(g.m, NULL, tool->arena, &g.probe, err);
-        g.probe.solved = true;
-        g.probe.camera = found;
-    }
+        look(&g);
     if (!code)
         code = print_all(&g, out, err);
     rl_exr_close(&file);

@@ -20,20 +20,25 @@ typedef struct looked {
     float *depth, *normal[3], *position[3];
 } looked;
 
+/* The part that holds a channel, or -1. */
+static int part_with(const rl_exr *file, const char *part, const char *channel)
+{
+    for (int k = 0; k < rl_exr_parts(file); k++)
+        if ((!part || !strcmp(part, rl_exr_part_at(file, k)->name)) &&
+            rl_exr_channel_named(rl_exr_part_at(file, k), channel))
+            return k;
+    return -1;
+}
+
 static rl_code read_planes(looked *l, const char *part, const char *const *names, int n, float **out,
                            rl_error *err)
 {
     const char *path = rl_exr_path(l->file);
-    int p = -1;
-    for (int k = 0; k < rl_exr_parts(l->file) && p < 0; k++)
-        if ((!part || !strcmp(part, rl_exr_part_at(l->file, k)->name)) &&
-            rl_exr_channel_named(rl_exr_part_at(l->file, k), names[0]))
-            p = k;
+    int p = part_with(l->file, part, names[0]);
     const rl_exr_part *info = p < 0 ? NULL : rl_exr_part_at(l->file, p);
     if (!info)
         return rl_fail_file(err, RL_E_FORMAT, path, "there is no channel '%s'", names[0]);
     if (!l->width) {
-        l->part = p;
         l->width = (size_t)info->width;
         l->height = (size_t)info->height;
     }
@@ -152,22 +157,20 @@ rl_code rl_probe_run(const rl_manifest *m, const rl_guess *position, rl_arena *a
     *out = (rl_probe){0};
     char *path = rl_capture_first(arena, m, depth ? depth->pattern : 0);
     rl_code code = path ? rl_exr_open(path, 0, &l.file, err) : rl_fail_memory(err, 1);
-    if (!code && !depth) {
-        find_camera(&l, out, &camera);
-        rl_exr_close(&l.file);
-        return RL_OK;
-    }
-    if (!code)
+    int part = !code && depth ? part_with(l.file, depth->part, depth->channels[0]) : 0;
+    l.part = part < 0 ? 0 : part;
+    bool known = !code && find_camera(&l, out, &camera);
+    if (!code && depth)
         code = read_planes(&l, depth->part, depth->channels, 1, &l.depth, err);
-    if (!code && normal)
+    if (!code && depth && normal)
         code = read_planes(&l, normal->part, normal->channels, normal->n_channels, l.normal, err);
-    if (!code && position)
+    if (!code && depth && position)
         code = read_planes(&l, position->part, position->names, 3, l.position, err);
-    if (!code)
+    if (!code && depth)
         code = look_at_depth(&l, depth, out, err);
-    if (!code && position)
+    if (!code && depth && position)
         look_at_positions(&l, depth, out);
-    if (!code && find_camera(&l, out, &camera) && normal && l.normal[2])
+    if (!code && known && l.depth && l.normal[2])
         look_at_normals(&l, depth, normal, &camera, out);
     rl_free(l.depth);
     for (int k = 0; k < 3; k++) {
