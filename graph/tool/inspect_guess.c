@@ -108,7 +108,7 @@ static rl_code set_cameras(guesser *g, rl_error *err)
 {
     rl_camera_spec *c = &g->m->camera;
     size_t n = g->m->frames.n;
-    bool still = true;
+    bool still = true, zooms = false;
     rl_manifest one = *g->m;
     c->matrix = rl_arena_array(g->arena, n, sizeof *c->matrix);
     c->fov_x = rl_arena_array(g->arena, n, sizeof *c->fov_x);
@@ -127,13 +127,16 @@ static rl_code set_cameras(guesser *g, rl_error *err)
         still = still && same_camera(&p.camera, &g->probe.camera);
         for (int k = 0; k < 16; k++) {
             double v = p.camera.matrix[k] * (k / 4 == 2 && c->forward_z ? -1 : 1);
-            c->matrix[i][k] = round(v * 1e7) / 1e7;
+            c->matrix[i][k] = round(v * 1e7) / 1e7 + 0.0; /* no -0 */
         }
         c->fov_x[i] = 2 * atan(p.width / 2 / p.camera.focal);
+        zooms = zooms || fabs(p.camera.focal / g->probe.camera.focal - 1) > 1e-3;
         c->fov_x[i] = round(c->fov_x[i] * 180 / pi * 1e5) / 1e5 * pi / 180;
     }
-    c->matrix_source = c->fov_source = still ? RL_SOURCE_ONE : RL_SOURCE_LIST;
-    c->n_matrix = c->n_fov = still ? 1 : n;
+    c->matrix_source = still ? RL_SOURCE_ONE : RL_SOURCE_LIST;
+    c->n_matrix = still ? 1 : n;
+    c->fov_source = zooms ? RL_SOURCE_LIST : RL_SOURCE_ONE;
+    c->n_fov = zooms ? n : 1;
     double shift[2] = {(g->probe.width / 2 - g->probe.camera.centre[0]) / g->probe.width,
                        (g->probe.camera.centre[1] - g->probe.height / 2) / g->probe.width};
     c->has_shift = fabs(shift[0]) > 1e-4 || fabs(shift[1]) > 1e-4;
