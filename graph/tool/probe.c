@@ -85,7 +85,7 @@ static rl_code look_at_depth(const looked *l, const rl_layer *layer, rl_probe *o
 }
 
 /* The camera of the first frame as a run would take it, when there is one. */
-static bool find_camera(const looked *l, rl_probe *out, camera_t *camera)
+static bool find_camera(const looked *l, rl_arena *arena, rl_probe *out, camera_t *camera)
 {
     rl_camera_info info;
     rl_camera_lens lens;
@@ -95,7 +95,7 @@ static bool find_camera(const looked *l, rl_probe *out, camera_t *camera)
     int frame = l->m->frames.n ? l->m->frames.numbers[0] : 1;
     rl_code code = rl_camera_read(l->m, frame, l->file, l->part, &info, &lens, &jitter, &ignored);
     out->matrix_source = rl_camera_header_matrix(l->file, l->part, l->m->camera.forward_z, header);
-    out->lens_source = lens.source;
+    out->lens_source = rl_arena_strdup(arena, lens.source); /* it may be the file's */
     out->lens_width = lens.width;
     out->width = info.display[2];
     out->height = info.display[3];
@@ -159,7 +159,7 @@ rl_code rl_probe_run(const rl_manifest *m, const rl_guess *position, rl_arena *a
     rl_code code = path ? rl_exr_open(path, 0, &l.file, err) : rl_fail_memory(err, 1);
     int part = !code && depth ? part_with(l.file, depth->part, depth->channels[0]) : 0;
     l.part = part < 0 ? 0 : part;
-    bool known = !code && find_camera(&l, out, &camera);
+    bool known = !code && find_camera(&l, arena, out, &camera);
     if (!code && depth)
         code = read_planes(&l, depth->part, depth->channels, 1, &l.depth, err);
     if (!code && depth && normal)
