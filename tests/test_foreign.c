@@ -296,6 +296,13 @@ static void test_first_steps(void **state)
     expect(&r, 2);
     has(r.err, "the file does not say where its camera is; `relit inspect ");
     tool_result_free(&r);
+    const char *const captures[] = {file, folder};
+    for (int i = 0; i < 2; i++) {
+        r = RUN("run", captures[i]);
+        expect(&r, 2);
+        has(r.err, "this is a capture, not a pipeline: `relit init ");
+        tool_result_free(&r);
+    }
     free(s);
     free(file);
     folder_remove(folder);
