@@ -283,22 +283,52 @@ static void write_unknown(writer *w, const foreign_scene *s)
     attr_numbers(w, "camera:fovx", RL_EXR_T_FLOAT, &s->fov_x, 1);
 }
 
+/* Writes and frees what is in the making. */
+static void finish(const char *path, writer *w)
+{
+    rl_error err = {0};
+    rl_exr_image image = {.data_window = {0, 0, FOREIGN_WIDTH - 1, FOREIGN_HEIGHT - 1},
+                          .display_window = {0, 0, FOREIGN_WIDTH - 1, FOREIGN_HEIGHT - 1},
+                          .channels = w->channels,
+                          .n_channels = w->n,
+                          .compression = RL_EXR_ZIP,
+                          .attrs = w->attrs,
+                          .n_attrs = w->n_attrs};
+    if (rl_exr_write(path, &image, NULL, NULL, &err))
+        fail_msg("%s", err.text);
+    for (size_t i = 0; i < w->n_planes; i++)
+        free(w->planes[i]);
+    *w = (writer){0};
+}
+
 void foreign_write(const char *path, const foreign_scene *s, foreign_kind kind)
 {
     static void (*const writers[])(writer *, const foreign_scene *) = {
         write_relit, write_blender, write_arnold, write_unreal, write_pbrt, write_vray, write_unknown};
     writer w = {0};
-    rl_error err = {0};
     writers[kind](&w, s);
-    rl_exr_image image = {.data_window = {0, 0, FOREIGN_WIDTH - 1, FOREIGN_HEIGHT - 1},
-                          .display_window = {0, 0, FOREIGN_WIDTH - 1, FOREIGN_HEIGHT - 1},
-                          .channels = w.channels,
-                          .n_channels = w.n,
-                          .compression = RL_EXR_ZIP,
-                          .attrs = w.attrs,
-                          .n_attrs = w.n_attrs};
-    if (rl_exr_write(path, &image, NULL, NULL, &err))
-        fail_msg("%s", err.text);
-    for (size_t i = 0; i < w.n_planes; i++)
-        free(w.planes[i]);
+    finish(path, &w);
+}
+
+void foreign_write_torn(const char *folder, const foreign_scene *s)
+{
+    static const char *const rgb[] = {"R", "G", "B"}, *const xyz[] = {"X", "Y", "Z"};
+    const struct {
+        const char *name, *const *channels;
+        const float (*v)[FOREIGN_PIXELS];
+    } files[] = {{"my_shot.0007.exr", rgb, s->albedo},
+                 {"my_shot_diffuse_albedo.0007.exr", rgb, s->albedo},
+                 {"my_shot_N.0007.exr", xyz, s->normal},
+                 {"my_shot_P.0007.exr", rgb, s->world},
+                 {"my_shot_depth.0007.exr", NULL, NULL}};
+    for (int i = 0; i < 5; i++) {
+        writer w = {0};
+        char path[1024];
+        snprintf(path, sizeof path, "%s/%s", folder, files[i].name);
+        if (files[i].v)
+            triple(&w, files[i].channels, files[i].v, plain, 0);
+        else
+            channel(&w, "Z", s->depth, NULL);
+        finish(path, &w);
+    }
 }

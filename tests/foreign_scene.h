@@ -35,6 +35,9 @@ typedef enum foreign_kind {
 } foreign_kind;
 
 void foreign_write(const char *path, const foreign_scene *s, foreign_kind kind);
+/* A file for each of albedo, normal, depth and position, whose names say so and whose channels do not; no
+ * camera. */
+void foreign_write_torn(const char *folder, const foreign_scene *s);
 /* A point in the world that this renderer has, in its unit. */
 void foreign_point(foreign_kind kind, const double metres[3], double out[3]);
 

@@ -196,6 +196,29 @@ static void test_shift(void **state)
     folder_remove(blender);
 }
 
+/* A file a layer: one manifest for all. */
+static void test_torn(void **state)
+{
+    (void)state;
+    char *folder = folder_new();
+    foreign_scene *s = foreign_scene_new(0);
+    foreign_write_torn(folder, s);
+    tool_result r = RUN("inspect", folder);
+    expect(&r, 0);
+    has(r.out,
+        "\nname: my_shot\nfiles:\n  albedo: my_shot_diffuse_albedo.####.exr\n  normal: my_shot_N.####.exr\n"
+        "  depth: my_shot_depth.####.exr\nframes: 7\n");
+    has(r.out, "camera: found from depth and my_shot_P.####.exr");
+    file_write(folder, "capture.yaml", r.out, strlen(r.out));
+    tool_result_free(&r);
+    float *want = truth(), *got = relight(folder, FOREIGN_BLENDER);
+    expect_same(got, want, 2e-4);
+    free(want);
+    free(got);
+    free(s);
+    folder_remove(folder);
+}
+
 /* ---- what is wrong is said --------------------------------------------------------------------------------
  */
 
@@ -316,6 +339,7 @@ int main(void)
         cmocka_unit_test(test_vray),     cmocka_unit_test(test_unknown),
         cmocka_unit_test(test_shift),    cmocka_unit_test(test_conventions),
         cmocka_unit_test(test_messages), cmocka_unit_test(test_first_steps),
+        cmocka_unit_test(test_torn),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -274,6 +274,8 @@ static void print_files(const rl_manifest *m, rl_str *s)
     }
     rl_str_add(s, "files:\n");
     for (int i = 0; i < m->n_layers; i++) {
+        if (!m->layers[i].n_channels) /* a constant is in no file */
+            continue;
         rl_str_add(s, "  ");
         print_text(s, m->layers[i].name);
         rl_str_add(s, ": ");

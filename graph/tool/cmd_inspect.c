@@ -197,23 +197,50 @@ static rl_code list_patterns(rl_arena *arena, const char *folder, const char ***
     return RL_OK;
 }
 
+/* Whether a capture is torn into several sequences: none has all that relit needs. */
+static rl_code find_torn(rl_tool *tool, const char *const *patterns, size_t n, bool *torn, rl_error *err)
+{
+    rl_code code = RL_OK;
+    *torn = n > 1;
+    for (size_t i = 0; i < n && !code && *torn; i++) {
+        rl_capture capture;
+        code = rl_capture_find(tool->arena, patterns[i], NULL, &capture, err);
+        *torn = !code && capture.missing;
+    }
+    return code;
+}
+
+/* The first file of each sequence, and one manifest. */
+static rl_code print_torn(rl_tool *tool, const char *const *patterns, size_t n, rl_str *out, rl_error *err)
+{
+    rl_code code = RL_OK;
+    for (size_t i = 0; i < n && !code; i++) {
+        rl_capture capture;
+        code = rl_capture_find(tool->arena, patterns[i], NULL, &capture, err);
+        char *first = code ? NULL : rl_capture_first(tool->arena, capture.manifest, 0);
+        if (!code)
+            code = first ? print_file(first, out, err) : rl_fail_memory(err, 1);
+    }
+    rl_str_add(out, "\n");
+    return code ? code : rl_inspect_guess_files(tool, patterns, n, out, err);
+}
+
 static rl_code print_folder(rl_tool *tool, const char *folder, rl_str *out, rl_error *err)
 {
     const char **patterns;
     size_t n;
+    bool torn = false;
     rl_code code = list_patterns(tool->arena, folder, &patterns, &n, err);
     if (!code && !n)
         code = rl_fail_file(err, RL_E_IO, folder, "the folder holds no capture.yaml and no EXR file");
+    if (!code)
+        code = find_torn(tool, patterns, n, &torn, err);
+    if (!code && torn)
+        return print_torn(tool, patterns, n, out, err);
     for (size_t i = 0; !code && i < n; i++) {
         rl_str_printf(out, "%s# %s\n", i ? "\n" : "", patterns[i]);
         code = print_capture(tool, patterns[i], out, err);
     }
-    if (!code && n > 1)
-        rl_str_add(
-            out,
-            "\n# Several sequences. Where each holds other layers of the same frames, write one manifest for "
-            "all of them, with\n"
-            "#   files: {normal: n.####.exr, depth: z.####.exr, default: beauty.####.exr}\n");
     return code;
 }
 

@@ -11,6 +11,7 @@ typedef struct rl_guess {
     const char *names[3]; /* in order */
     const char *part;     /* NULL in a file of one part */
     bool hashed;          /* stencil: Cryptomatte */
+    int pattern;          /* of the manifest, that holds them; set by the caller */
 } rl_guess;
 
 /* The likeliest channels for a layer, or for the world position of each pixel (RL_LAYER_COUNT), which is no

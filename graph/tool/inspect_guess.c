@@ -11,11 +11,17 @@
 
 static const double pi = 3.14159265358979323846;
 
+/* Where a channel is. */
+typedef struct source {
+    int pattern;
+    const char *part, *name;
+} source;
+
 /* What is known while a guess is made. */
 typedef struct guesser {
     rl_arena *arena;
-    const rl_capture *capture;
-    const rl_channel *channels;
+    rl_channel *channels; /* by which names layers are looked for, */
+    source *sources;      /* and where they are */
     size_t n;
     const char *preset; /* whose conventions are taken; NULL: none fits well enough */
     rl_manifest *m;
@@ -29,11 +35,28 @@ typedef struct guesser {
 /* ---- layers ----------------------------------------------------------------------------------------------
  */
 
+/* rl_guess_layer, with the channels' own names. */
+static bool guess_layer(const guesser *g, rl_layer_id id, rl_guess *out)
+{
+    if (!rl_guess_layer(id, g->channels, g->n, out))
+        return false;
+    for (int k = 0; k < 3 && out->names[k]; k++)
+        for (size_t i = 0; i < g->n; i++)
+            if (g->channels[i].name == out->names[k]) {
+                const char *part = g->sources[i].part;
+                out->names[k] = g->sources[i].name;
+                out->part = part && part[0] ? part : NULL;
+                out->pattern = g->sources[i].pattern;
+                break;
+            }
+    return true;
+}
+
 /* A layer by the likeliest names, with the conventions that most renderers have. */
 static rl_code add_layer(guesser *g, rl_layer_id id, rl_error *err)
 {
     rl_guess guess = {0};
-    bool found = rl_guess_layer(id, g->channels, g->n, &guess);
+    bool found = guess_layer(g, id, &guess);
     if (!found && id != RL_LAYER_STENCIL)
         return RL_OK;
     rl_manifest *m = g->m;
@@ -51,6 +74,7 @@ static rl_code add_layer(guesser *g, rl_layer_id id, rl_error *err)
                                        .n_alternatives = found,
                                        .constant = 1,
                                        .part = guess.part,
+                                       .pattern = guess.pattern,
                                        .hashed = guess.hashed,
                                        .colorspace = type->format == RL_RGB ? "lin_rec709" : NULL,
                                        .axes = {1, 2, 3},
@@ -71,11 +95,20 @@ static bool looks_along_z(const rl_exr *file)
     return from && !strcmp(from, "worldToCamera") && det < 0;
 }
 
+/* What is required and not there yet. */
+static rl_code add_layers(guesser *g, rl_error *err)
+{
+    rl_code code = RL_OK;
+    for (int id = 0; id < RL_LAYER_COUNT && !code; id++)
+        if (rl_layer_types[id].required && !rl_manifest_layer(g->m, rl_layer_types[id].name))
+            code = add_layer(g, (rl_layer_id)id, err);
+    return code;
+}
+
 /* The manifest of a file that lacks something, or that no preset knows. */
 static rl_code make_manifest(guesser *g, const rl_exr *file, rl_error *err)
 {
-    static const rl_layer_id wanted[] = {RL_LAYER_ALBEDO, RL_LAYER_NORMAL, RL_LAYER_DEPTH, RL_LAYER_STENCIL};
-    const char *presets = rl_data_path(g->arena, "presets"), *path = g->capture->manifest->patterns[0].path;
+    const char *presets = rl_data_path(g->arena, "presets"), *path = g->m->patterns[0].path;
     rl_preset_match match;
     rl_code code = rl_preset_find(g->arena, presets, g->channels, g->n, &match, err);
     if (!code && match.name && match.layers >= 2 && match.missing_required <= 2)
@@ -86,10 +119,7 @@ static rl_code make_manifest(guesser *g, const rl_exr *file, rl_error *err)
         code = rl_manifest_bind_found(g->arena, g->m, g->channels, g->n, err);
     if (!code && !g->preset)
         g->m->camera.forward_z = looks_along_z(file);
-    for (size_t i = 0; i < sizeof wanted / sizeof *wanted && !code; i++)
-        if (!rl_manifest_layer(g->m, rl_layer_types[wanted[i]].name))
-            code = add_layer(g, wanted[i], err);
-    return code;
+    return code ? code : add_layers(g, err);
 }
 
 /* ---- the camera ------------------------------------------------------------------------------------------
@@ -153,7 +183,9 @@ static void say_camera(const guesser *g, rl_str *out)
     const rl_probe *p = &g->probe;
     const rl_camera_spec *c = &g->m->camera;
     if (p->solved && c->matrix_source != RL_SOURCE_HEADER) {
-        rl_str_printf(out, "#   camera: found from depth and %s, %.2g pixels off\n", g->position.names[0],
+        rl_str_printf(out, "#   camera: found from depth and %s, %.2g pixels off\n",
+                      g->m->n_patterns > 1 ? rl_path_name(g->m->patterns[g->position.pattern].path)
+                                           : g->position.names[0],
                       p->camera.error);
         return;
     }
@@ -278,7 +310,8 @@ static rl_code print_all(const guesser *g, rl_str *out, rl_error *err)
     if (g->preset)
         rl_str_printf(out, "# guessed by preset '%s'%s: ", g->preset, g->named ? " and by names" : "");
     else
-        rl_str_add(out, "# no preset fits this file; guessed by names: ");
+        rl_str_printf(out, "# no preset fits %s; guessed by names: ",
+                      g->m->n_patterns > 1 ? "these files" : "this file");
     rl_str_printf(out, "check what follows, then save it as %s/capture.yaml\n", folder);
     if (g->unread.code)
         rl_str_printf(out, "#   the first frame's pixels cannot be looked at: %s\n", g->unread.text);
@@ -298,7 +331,7 @@ static rl_code print_all(const guesser *g, rl_str *out, rl_error *err)
 static void look(guesser *g)
 {
     rl_error *err = &g->unread;
-    g->positions = rl_guess_layer(RL_LAYER_COUNT, g->channels, g->n, &g->position);
+    g->positions = guess_layer(g, RL_LAYER_COUNT, &g->position);
     rl_code code = rl_probe_run(g->m, g->positions ? &g->position : NULL, g->arena, &g->probe, err);
     if (code || !g->probe.solved || g->probe.matrix_source || g->m->camera.matrix_source != RL_SOURCE_HEADER)
         return;
@@ -311,27 +344,126 @@ static void look(guesser *g)
     g->probe.camera = found;
 }
 
+/* The channels of the first file of one of the patterns. With `word`, what a channel without a layer in its
+ * name is called: "R" of shot_normal.0001.exr is looked for as normal.R. */
+static rl_code add_channels(guesser *g, int pattern, const rl_exr *file, const char *word, rl_error *err)
+{
+    rl_channel *found;
+    size_t n;
+    rl_code code = rl_capture_channels(g->arena, file, &found, &n, err);
+    rl_channel *channels = code ? NULL : rl_arena_array(g->arena, g->n + n + 1, sizeof *channels);
+    source *sources = code ? NULL : rl_arena_array(g->arena, g->n + n + 1, sizeof *sources);
+    if (code || !channels || !sources)
+        return code ? code : rl_fail_memory(err, (g->n + n) * sizeof *channels);
+    if (g->n) {
+        memcpy(channels, g->channels, g->n * sizeof *channels);
+        memcpy(sources, g->sources, g->n * sizeof *sources);
+    }
+    for (size_t i = 0; i < n; i++) {
+        const char *name = rl_arena_strdup(g->arena, found[i].name);
+        const char *part = rl_arena_strdup(g->arena, found[i].part ? found[i].part : "");
+        const char *called = word && !strchr(found[i].name, '.')
+                                 ? rl_arena_printf(g->arena, "%s.%s", word, found[i].name)
+                                 : rl_arena_strdup(g->arena, found[i].name);
+        const char *place = word ? rl_arena_printf(g->arena, "%d:%s", pattern, part ? part : "") : part;
+        if (!name || !part || !called || !place)
+            return rl_fail_memory(err, 64);
+        channels[g->n] = (rl_channel){place, called};
+        sources[g->n++] = (source){pattern, part, name};
+    }
+    g->channels = channels;
+    g->sources = sources;
+    return RL_OK;
+}
+
 rl_code rl_inspect_guess(rl_tool *tool, const rl_capture *capture, rl_str *out, rl_error *err)
 {
-    guesser g = {.arena = tool->arena,
-                 .capture = capture,
-                 .m = capture->manifest,
-                 .preset = capture->missing ? NULL : capture->preset};
+    guesser g = {
+        .arena = tool->arena, .m = capture->manifest, .preset = capture->missing ? NULL : capture->preset};
     rl_exr *file = NULL;
-    rl_channel *channels = NULL;
     char *path = rl_capture_first(tool->arena, capture->manifest, 0);
     rl_code code = path ? rl_exr_open(path, 0, &file, err) : rl_fail_memory(err, 1);
     if (!code)
-        code = rl_capture_channels(tool->arena, file, &channels, &g.n, err);
-    g.channels = channels;
+        code = add_channels(&g, 0, file, NULL, err);
     if (!code && capture->missing)
         code = make_manifest(&g, file, err);
+    rl_exr_close(&file);
     if (!code && capture->missing)
         rl_capture_name_ids(tool->arena, g.m, &(rl_error){0});
     if (!code)
         look(&g);
-    if (!code)
-        code = print_all(&g, out, err);
+    return code ? code : print_all(&g, out, err);
+}
+
+/* "shot_world-normal" -> "normal": what a file is called after the last separator. */
+static const char *last_word(const char *name)
+{
+    const char *word = name;
+    for (; *name; name++)
+        word = strchr("._- ", *name) ? name + 1 : word;
+    return word;
+}
+
+/* What the names of all files begin with, up to a separator; NULL when that is nothing. */
+static const char *common_name(guesser *g, const char *a, const char *b)
+{
+    size_t n = 0;
+    while (a && b && a[n] && a[n] == b[n])
+        n++;
+    while (n > 0 && a[n] && !strchr("._- ", a[n]))
+        n--;
+    return n ? rl_arena_strndup(g->arena, a, n) : NULL;
+}
+
+/* Layers of the same frames in several files: one manifest for all. */
+static rl_code make_map(guesser *g, const char *const *paths, size_t n, const char *name, rl_error *err)
+{
+    rl_guess depth = {0};
+    rl_pattern *patterns = rl_arena_array(g->arena, n, sizeof *patterns);
+    bool found = guess_layer(g, RL_LAYER_DEPTH, &depth), ahead = false;
+    rl_code code = patterns ? RL_OK : rl_fail_memory(err, n * sizeof *patterns);
+    if (!code) /* frames, and the name, of the depth's */
+        code = rl_manifest_bare(g->arena, paths[found ? depth.pattern : 0], NULL, NULL, NULL, &g->m, err);
+    if (code)
+        return code;
+    for (size_t i = 0; i < n; i++)
+        patterns[i] =
+            (rl_pattern){.path = paths[i], .where = g->m->where, .numbered = g->m->patterns[0].numbered};
+    g->m->patterns = patterns;
+    g->m->n_patterns = (int)n;
+    g->m->name = name ? name : g->m->name;
+    rl_exr *file = NULL;
+    char *first = rl_capture_first(g->arena, g->m, found ? depth.pattern : 0);
+    code = first ? rl_exr_open(first, 0, &file, err) : rl_fail_memory(err, 1);
+    ahead = !code && looks_along_z(file);
     rl_exr_close(&file);
-    return code;
+    g->m->camera.forward_z = ahead;
+    return code ? code : add_layers(g, err);
+}
+
+rl_code rl_inspect_guess_files(rl_tool *tool, const char *const *paths, size_t n, rl_str *out, rl_error *err)
+{
+    guesser g = {.arena = tool->arena};
+    const char *name = NULL;
+    rl_code code = RL_OK;
+    for (size_t i = 0; i < n && !code; i++) {
+        rl_manifest *one;
+        rl_exr *file = NULL;
+        code = rl_manifest_bare(g.arena, paths[i], NULL, NULL, NULL, &one, err);
+        char *path = code ? NULL : rl_capture_first(g.arena, one, 0);
+        if (!code)
+            code = path ? rl_exr_open(path, 0, &file, err) : rl_fail_memory(err, 1);
+        if (!code)
+            code = add_channels(&g, (int)i, file, last_word(one->name), err);
+        if (!code)
+            name = i ? common_name(&g, name, one->name) : one->name;
+        rl_exr_close(&file);
+    }
+    if (!code)
+        code = make_map(&g, paths, n, name, err);
+    if (!code) {
+        rl_capture_name_ids(g.arena, g.m, &(rl_error){0});
+        look(&g);
+    }
+    return code ? code : print_all(&g, out, err);
 }

@@ -9,4 +9,9 @@
  * was found, what to check, and what is missing. */
 rl_code rl_inspect_guess(rl_tool *tool, const rl_capture *capture, rl_str *out, rl_error *err);
 
+/* The same for sequences of one folder none of which has all layers: renderers that write a file a layer,
+ * whose name says which. */
+rl_code rl_inspect_guess_files(rl_tool *tool, const char *const *patterns, size_t n, rl_str *out,
+                               rl_error *err);
+
 #endif

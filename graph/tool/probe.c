@@ -11,9 +11,10 @@
 
 enum { SIDE = 64 };
 
-/* The file, and planes of its data window. */
+/* The file of the depth, and planes of its data window. */
 typedef struct looked {
     const rl_manifest *m;
+    rl_arena *arena;
     rl_exr *file;
     int part; /* that holds depth */
     size_t width, height;
@@ -30,20 +31,17 @@ static int part_with(const rl_exr *file, const char *part, const char *channel)
     return -1;
 }
 
-static rl_code read_planes(looked *l, const char *part, const char *const *names, int n, float **out,
-                           rl_error *err)
+static rl_code read_part(looked *l, const rl_exr *file, int p, const char *const *names, int n, float **out,
+                         rl_error *err)
 {
-    const char *path = rl_exr_path(l->file);
-    int p = part_with(l->file, part, names[0]);
-    const rl_exr_part *info = p < 0 ? NULL : rl_exr_part_at(l->file, p);
-    if (!info)
-        return rl_fail_file(err, RL_E_FORMAT, path, "there is no channel '%s'", names[0]);
+    const rl_exr_part *info = rl_exr_part_at(file, p);
     if (!l->width) {
         l->width = (size_t)info->width;
         l->height = (size_t)info->height;
     }
     if ((size_t)info->width != l->width || (size_t)info->height != l->height)
-        return rl_fail_file(err, RL_E_FORMAT, path, "channel '%s' has another size than the depth", names[0]);
+        return rl_fail_file(err, RL_E_FORMAT, rl_exr_path(file),
+                            "channel '%s' has another size than the depth", names[0]);
     rl_exr_plane planes[3];
     for (int k = 0; k < n; k++) {
         out[k] = rl_calloc(l->width * l->height, sizeof *out[k]);
@@ -55,7 +53,23 @@ static rl_code read_planes(looked *l, const char *part, const char *const *names
                                    .replace_inf = true,
                                    .inf_value = 3e38f};
     }
-    return rl_exr_read(l->file, p, planes, (size_t)n, NULL, NULL, err);
+    return rl_exr_read(file, p, planes, (size_t)n, NULL, NULL, err);
+}
+
+/* Channels of the first frame's file of a pattern. */
+static rl_code read_planes(looked *l, int pattern, const char *part, const char *const *names, int n,
+                           float **out, rl_error *err)
+{
+    rl_exr *file = NULL;
+    char *path = rl_capture_first(l->arena, l->m, pattern);
+    rl_code code = path ? rl_exr_open(path, 0, &file, err) : rl_fail_memory(err, 1);
+    int p = code ? -1 : part_with(file, part, names[0]);
+    if (!code && p < 0)
+        code = rl_fail_file(err, RL_E_FORMAT, path, "there is no channel '%s'", names[0]);
+    if (!code)
+        code = read_part(l, file, p, names, n, out, err);
+    rl_exr_close(&file);
+    return code;
 }
 
 static int by_value(const void *a, const void *b)
@@ -85,7 +99,7 @@ static rl_code look_at_depth(const looked *l, const rl_layer *layer, rl_probe *o
 }
 
 /* The camera of the first frame as a run would take it, when there is one. */
-static bool find_camera(const looked *l, rl_arena *arena, rl_probe *out, camera_t *camera)
+static bool find_camera(const looked *l, rl_probe *out, camera_t *camera)
 {
     rl_camera_info info;
     rl_camera_lens lens;
@@ -95,7 +109,7 @@ static bool find_camera(const looked *l, rl_arena *arena, rl_probe *out, camera_
     int frame = l->m->frames.n ? l->m->frames.numbers[0] : 1;
     rl_code code = rl_camera_read(l->m, frame, l->file, l->part, &info, &lens, &jitter, &ignored);
     out->matrix_source = rl_camera_header_matrix(l->file, l->part, l->m->camera.forward_z, header);
-    out->lens_source = rl_arena_strdup(arena, lens.source); /* it may be the file's */
+    out->lens_source = rl_arena_strdup(l->arena, lens.source); /* it may be the file's */
     out->lens_width = lens.width;
     out->width = info.display[2];
     out->height = info.display[3];
@@ -152,20 +166,21 @@ rl_code rl_probe_run(const rl_manifest *m, const rl_guess *position, rl_arena *a
                      rl_error *err)
 {
     const rl_layer *depth = rl_manifest_layer(m, "depth"), *normal = rl_manifest_layer(m, "normal");
-    looked l = {.m = m};
+    looked l = {.m = m, .arena = arena};
     camera_t camera;
     *out = (rl_probe){0};
     char *path = rl_capture_first(arena, m, depth ? depth->pattern : 0);
     rl_code code = path ? rl_exr_open(path, 0, &l.file, err) : rl_fail_memory(err, 1);
     int part = !code && depth ? part_with(l.file, depth->part, depth->channels[0]) : 0;
     l.part = part < 0 ? 0 : part;
-    bool known = !code && find_camera(&l, arena, out, &camera);
+    bool known = !code && find_camera(&l, out, &camera);
     if (!code && depth)
-        code = read_planes(&l, depth->part, depth->channels, 1, &l.depth, err);
+        code = read_planes(&l, depth->pattern, depth->part, depth->channels, 1, &l.depth, err);
     if (!code && depth && normal)
-        code = read_planes(&l, normal->part, normal->channels, normal->n_channels, l.normal, err);
+        code = read_planes(&l, normal->pattern, normal->part, normal->channels, normal->n_channels, l.normal,
+                           err);
     if (!code && depth && position)
-        code = read_planes(&l, position->part, position->names, 3, l.position, err);
+        code = read_planes(&l, position->pattern, position->part, position->names, 3, l.position, err);
     if (!code && depth)
         code = look_at_depth(&l, depth, out, err);
     if (!code && depth && position)

@@ -21,7 +21,7 @@ typedef struct rl_probe {
     double width, height;    /* of the display window */
 } rl_probe;
 
-/* `m` has its layers bound, all in one file a frame; without `depth` only the header is looked at. `position`
+/* `m` has its layers bound; without `depth` only the header is looked at. `position`
  * may be NULL. */
 rl_code rl_probe_run(const rl_manifest *m, const rl_guess *position, rl_arena *arena, rl_probe *out,
                      rl_error *err);
