@@ -11,6 +11,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "graph/base/alloc.h"
+#include "graph/run/camera_header.h"
+#include "graph/tool/camera_solve.h"
 #include "tests/foreign_scene.h"
 #include "tests/tool_run.h"
 
@@ -304,6 +307,123 @@ static void test_messages(void **state)
                    "'axes': expected three of x, y, z");
 }
 
+/* ---- cameras ---------------------------------------------------------------------------------------------
+ */
+
+/* Every `step`-th pixel that shows something. */
+static size_t see(const foreign_scene *s, double unit, rl_seen *out)
+{
+    size_t n = 0;
+    for (int k = 0; k < FOREIGN_PIXELS; k += 3)
+        if (s->id[k]) {
+            out[n] = (rl_seen){
+                .x = k % FOREIGN_WIDTH + 0.5, .y = k / FOREIGN_WIDTH + 0.5, .depth = (double)s->depth[k]};
+            for (int i = 0; i < 3; i++)
+                out[n].world[i] = (double)s->world[i][k] * unit;
+            n++;
+        }
+    return n;
+}
+
+static void test_solve(void **state)
+{
+    (void)state;
+    foreign_scene *s = foreign_scene_new(0.06);
+    rl_seen *seen = calloc(FOREIGN_PIXELS, sizeof *seen);
+    rl_solved_camera c;
+    double want[16];
+    assert_non_null(seen);
+    size_t n = see(s, 1, seen);
+    for (size_t i = 0; i < n; i += 9) /* edges: a mean of what lies before and behind */
+        seen[i].world[1] += 0.4;
+    assert_true(rl_camera_solve(seen, n, &c));
+    foreign_matrix(s, -1, want);
+    for (int i = 0; i < 16; i++)
+        assert_true(fabs(c.matrix[i] - want[4 * (i % 4) + i / 4]) < 2e-3);
+    assert_true(fabs(c.focal - 48 / tan(0.4)) < 0.2 && fabs(c.aspect - 1) < 2e-3);
+    assert_true(fabs(c.centre[0] - (48 - 0.06 * 96)) < 0.2 && fabs(c.centre[1] - 36) < 0.2);
+    n = see(s, 1, seen);
+    assert_true(rl_camera_solve(seen, n, &c) && c.error < 1e-3);
+    assert_false(rl_camera_solve(seen, see(s, 100, seen), &c)); /* positions in cm, depth in m */
+    n = see(s, 1, seen);
+    for (size_t i = 0; i < n; i++) /* radial depth */
+        seen[i].depth *= 1 + 1e-4 * (pow(seen[i].x - 42, 2) + pow(seen[i].y - 36, 2));
+    assert_true(!rl_camera_solve(seen, n, &c) || c.error > 0.5);
+    n = see(s, 1, seen);
+    for (size_t i = 0; i < n; i++) /* a plane alone does not tell */
+        seen[i].world[2] = 0;
+    assert_false(rl_camera_solve(seen, n, &c));
+    assert_false(rl_camera_solve(seen, 15, &c));
+    free(seen);
+    free(s);
+}
+
+/* What the headers of real files hold: Arnold 5.1.0.0 (Houdini, 45 degrees) and V-Ray 3.60 (Maya, 35 mm on 36
+ * mm). */
+static void test_headers(void **state)
+{
+    (void)state;
+    static const double arnold[16] = {
+        0.70710677,   -0.33927497, -0.6203971, 0,           0,          0.87737405,
+        -0.47980732,  0,           -0.7071069, -0.33927497, -0.6203971, 0,
+        2.6822093e-7, 0.1647007,   3.0775151,  1.0000001};
+    static const double ndc[16] = {
+        1.7071049,  -0.81908137, -0.62041306, -0.6203971, 0,           2.1181662,  -0.4798197, -0.47980732,
+        -1.7071053, -0.81908137, -0.62041306, -0.6203971, 6.475419e-7, 0.39762226, 2.9775918,  3.0775151};
+    static const double vray[16] = {1, 0, 0, 0, 0, 0, 1, 0, 0, -1, 0, 0, 0, 5, 20, 1}, degrees = 54.43222;
+    static const double vray_camera[16] = {1, 0, 0, 0, 0, 1,  0,   0,
+                                           0, 0, 1, 0, 0, -5, -20, 1}; /* at (0, 5, 20), looks along -z */
+    const float pixel = 1;
+    char *folder = folder_new(), *path = path_in(folder, "h.exr");
+    for (int kind = 0; kind < 2; kind++) {
+        rl_exr_source channel = {.name = "Z", .type = RL_EXR_FLOAT, .floats = &pixel, .stride = 1};
+        rl_exr_attribute attrs[2] = {
+            {kind ? "cameraTransform" : "worldToCamera", {.type = RL_EXR_T_M44F}},
+            {kind ? "cameraFov" : "worldToNDC", {.type = kind ? RL_EXR_T_FLOAT : RL_EXR_T_M44F}}};
+        memcpy(attrs[0].value.v, kind ? vray : arnold, sizeof vray);
+        memcpy(attrs[1].value.v, kind ? &degrees : ndc, kind ? sizeof degrees : sizeof ndc);
+        rl_exr_image image = {.channels = &channel, .n_channels = 1, .attrs = attrs, .n_attrs = 2};
+        rl_exr *file = NULL;
+        rl_error err = {0};
+        double m[16];
+        rl_camera_lens lens;
+        assert_int_equal(rl_exr_write(path, &image, NULL, NULL, &err), RL_OK);
+        assert_int_equal(rl_exr_open(path, 0, &file, &err), RL_OK);
+        assert_string_equal(rl_camera_header_matrix(file, 0, !kind, m), attrs[0].name);
+        rl_camera_header_lens(file, 0, !kind, &lens);
+        assert_string_equal(lens.source, attrs[1].name);
+        for (int i = 0; i < 16; i++)
+            assert_true(fabs(m[i] - (kind ? vray_camera : arnold)[i]) < 1e-6);
+        double fov = kind ? lens.fov_x : 2 * atan(lens.width / 2);
+        assert_true(fabs(fov * 180 / 3.14159265358979 - (kind ? degrees : 45)) < 1e-3);
+        assert_true(fabs(lens.centre[0]) < 1e-3 && fabs(lens.centre[1]) < 1e-3);
+        rl_exr_close(&file);
+    }
+    free(path);
+    folder_remove(folder);
+}
+
+/* Memory that runs out anywhere is an error, or what is not said. */
+static void test_failing_memory(void **state)
+{
+    (void)state;
+    char *folder = folder_new(), *file = path_in(folder, "shot.0007.exr");
+    foreign_scene *s = foreign_scene_new(0);
+    foreign_write(file, s, FOREIGN_BLENDER);
+    bool failed = true;
+    for (int n = 1; n < 4000 && failed; n += n < 60 ? 1 : 7) {
+        rl_alloc_fail_at((unsigned long)n, 0);
+        tool_result r = RUN("inspect", folder);
+        bool done = rl_alloc_fail_at(0, 0) > 0;
+        failed = !done;
+        assert_true(r.status == 0 || r.err[0]);
+        tool_result_free(&r);
+    }
+    free(s);
+    free(file);
+    folder_remove(folder);
+}
+
 /* Steps that a newcomer takes before there is a manifest. */
 static void test_first_steps(void **state)
 {
@@ -339,7 +459,8 @@ int main(void)
         cmocka_unit_test(test_vray),     cmocka_unit_test(test_unknown),
         cmocka_unit_test(test_shift),    cmocka_unit_test(test_conventions),
         cmocka_unit_test(test_messages), cmocka_unit_test(test_first_steps),
-        cmocka_unit_test(test_torn),
+        cmocka_unit_test(test_torn),     cmocka_unit_test(test_solve),
+        cmocka_unit_test(test_headers),  cmocka_unit_test(test_failing_memory),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -142,7 +142,8 @@ static bool solve_once(const rl_seen *seen, size_t n, rl_solved_camera *out)
     return split(rows, out);
 }
 
-static bool rank(rl_seen *seen, size_t n, rl_solved_camera *c)
+/* Sorts by distance; *inliers: how many are as near as exact pixels with noise would be. */
+static bool rank(rl_seen *seen, size_t n, rl_solved_camera *c, size_t *inliers)
 {
     ranked *all = rl_malloc(n * sizeof *all);
     if (!all)
@@ -150,16 +151,25 @@ static bool rank(rl_seen *seen, size_t n, rl_solved_camera *c)
     for (size_t k = 0; k < n; k++)
         all[k] = (ranked){distance(c, &seen[k]), seen[k]};
     qsort(all, n, sizeof *all, by_error);
-    for (size_t k = 0; k < n; k++)
-        seen[k] = all[k].seen;
     c->error = all[n / 2].error;
+    *inliers = 0;
+    for (size_t k = 0; k < n; k++) {
+        seen[k] = all[k].seen;
+        *inliers += all[k].error < 4 * c->error + 1e-3;
+    }
     rl_free(all);
     return true;
 }
 
+/* Least trimmed squares by concentration steps (Rousseeuw and Van Driessen 1999): fit the three quarters that
+ * fit best, again and again; each step is no worse than the one before. At last, all that fit. */
 bool rl_camera_solve(rl_seen *seen, size_t n, rl_solved_camera *out)
 {
-    if (n < 16 || !solve_once(seen, n, out) || !rank(seen, n, out))
+    size_t inliers;
+    if (n < 16 || !solve_once(seen, n, out) || !rank(seen, n, out, &inliers))
         return false;
-    return solve_once(seen, n / 2 < 16 ? n : n / 2, out) && rank(seen, n, out);
+    for (int i = 0; i < 8; i++)
+        if (!solve_once(seen, n - n / 4, out) || !rank(seen, n, out, &inliers))
+            return false;
+    return solve_once(seen, inliers < 16 ? n : inliers, out) && rank(seen, n, out, &inliers);
 }

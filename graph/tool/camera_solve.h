@@ -19,9 +19,9 @@ typedef struct rl_solved_camera {
     double error; /* median distance between where the pixels are and where this camera puts them, pixels */
 } rl_solved_camera;
 
-/* Least squares, twice: the second time without the half that fits worst (edges, where renderers blend).
- * `seen` is reordered. False when there are fewer than 16, when they lie in one plane of depth or in one
- * line, or when position and depth differ in unit or depth is not planar; else `error` tells how good the
+/* Least squares of what fits: up to a quarter may be off (edges, where renderers blend what lies before and
+ * behind). `seen` is reordered. False when there are fewer than 16, when they lie in one plane of depth or in
+ * one line, or when position and depth differ in unit or depth is not planar; else `error` tells how good the
  * result is. */
 bool rl_camera_solve(rl_seen *seen, size_t n, rl_solved_camera *out);
 
