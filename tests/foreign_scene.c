@@ -97,6 +97,7 @@ void foreign_point(foreign_kind kind, const double metres[3], double out[3])
 /* A file in the making; planes that are not the scene's own are freed at the end. */
 typedef struct writer {
     rl_exr_source channels[32];
+    int x, y; /* of the windows */
     size_t n, n_planes, n_attrs, n_texts;
     float *planes[32];
     rl_exr_attribute attrs[16];
@@ -287,8 +288,9 @@ static void write_unknown(writer *w, const foreign_scene *s)
 static void finish(const char *path, writer *w)
 {
     rl_error err = {0};
-    rl_exr_image image = {.data_window = {0, 0, FOREIGN_WIDTH - 1, FOREIGN_HEIGHT - 1},
-                          .display_window = {0, 0, FOREIGN_WIDTH - 1, FOREIGN_HEIGHT - 1},
+    rl_exr_box at = {w->x, w->y, w->x + FOREIGN_WIDTH - 1, w->y + FOREIGN_HEIGHT - 1};
+    rl_exr_image image = {.data_window = at,
+                          .display_window = at,
                           .channels = w->channels,
                           .n_channels = w->n,
                           .compression = RL_EXR_ZIP,
@@ -305,7 +307,7 @@ void foreign_write(const char *path, const foreign_scene *s, foreign_kind kind)
 {
     static void (*const writers[])(writer *, const foreign_scene *) = {
         write_relit, write_blender, write_arnold, write_unreal, write_pbrt, write_vray, write_unknown};
-    writer w = {0};
+    writer w = {.x = s->x, .y = s->y};
     writers[kind](&w, s);
     finish(path, &w);
 }

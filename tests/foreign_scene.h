@@ -13,6 +13,7 @@ enum { FOREIGN_WIDTH = 96, FOREIGN_HEIGHT = 72, FOREIGN_PIXELS = FOREIGN_WIDTH *
 typedef struct foreign_scene {
     double position[3], right[3], up[3], ahead[3]; /* of the camera */
     double yaw, pitch;                             /* degrees; from x to y, and up */
+    int x, y;                                      /* where the windows of the file begin; 0 */
     double fov_x, shift;                           /* radians; to the right, in widths */
     float albedo[3][FOREIGN_PIXELS], normal[3][FOREIGN_PIXELS], world[3][FOREIGN_PIXELS],
         depth[FOREIGN_PIXELS];

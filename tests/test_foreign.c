@@ -34,10 +34,11 @@ static void has(const char *text, const char *what)
 }
 
 /* A folder with one frame, and what inspect makes of it in its capture.yaml. */
-static char *make(foreign_kind kind, double shift, char **manifest)
+static char *make_at(foreign_kind kind, double shift, int x, char **manifest)
 {
     char *folder = folder_new(), *file = path_in(folder, "shot.0007.exr");
     foreign_scene *s = foreign_scene_new(shift);
+    s->x = s->y = x;
     foreign_write(file, s, kind);
     tool_result r = RUN("inspect", folder);
     expect(&r, 0);
@@ -47,6 +48,11 @@ static char *make(foreign_kind kind, double shift, char **manifest)
     free(file);
     free(s);
     return folder;
+}
+
+static char *make(foreign_kind kind, double shift, char **manifest)
+{
+    return make_at(kind, shift, 0, manifest);
 }
 
 /* Relights it with one lamp and reads R, G, B. Any warning fails. */
@@ -186,6 +192,11 @@ static void test_shift(void **state)
     char *blender = make(FOREIGN_BLENDER, 0.06, &manifest);
     has(manifest, "shift: [0.06, 0]");
     free(manifest);
+    char *moved = make_at(FOREIGN_BLENDER, 0.06, 17, &manifest); /* windows that do not begin at 0 */
+    has(manifest, "shift: [0.06, 0]");
+    has(manifest, "normal: fits depth and camera");
+    free(manifest);
+    folder_remove(moved);
     float *a = relight(arnold, FOREIGN_ARNOLD), *b = relight(blender, FOREIGN_BLENDER), *straight = truth();
     expect_same(a, b, 2e-4);
     double differ = 0;

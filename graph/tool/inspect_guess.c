@@ -167,8 +167,9 @@ static rl_code set_cameras(guesser *g, rl_error *err)
     c->n_matrix = still ? 1 : n;
     c->fov_source = zooms ? RL_SOURCE_LIST : RL_SOURCE_ONE;
     c->n_fov = zooms ? n : 1;
-    double shift[2] = {(g->probe.width / 2 - g->probe.camera.centre[0]) / g->probe.width,
-                       (g->probe.camera.centre[1] - g->probe.height / 2) / g->probe.width};
+    const rl_probe *p = &g->probe;
+    double shift[2] = {(p->x + p->width / 2 - p->camera.centre[0]) / p->width,
+                       (p->camera.centre[1] - p->y - p->height / 2) / p->width};
     c->has_shift = fabs(shift[0]) > 1e-4 || fabs(shift[1]) > 1e-4;
     for (int k = 0; k < 2; k++)
         c->shift[k] = round(shift[k] * 1e5) / 1e5;

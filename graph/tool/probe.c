@@ -111,6 +111,8 @@ static bool find_camera(const looked *l, rl_probe *out, camera_t *camera)
     out->matrix_source = rl_camera_header_matrix(l->file, l->part, l->m->camera.forward_z, header);
     out->lens_source = rl_arena_strdup(l->arena, lens.source); /* it may be the file's */
     out->lens_width = lens.width;
+    out->x = info.display[0];
+    out->y = info.display[1];
     out->width = info.display[2];
     out->height = info.display[3];
     return !code && !rl_camera_make(&info, camera, &ignored);

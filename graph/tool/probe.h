@@ -17,8 +17,8 @@ typedef struct rl_probe {
     bool looked_at_normals; /* `check` holds something */
     rl_normal_check check;
     bool solved;
-    rl_solved_camera camera; /* from `position` */
-    double width, height;    /* of the display window */
+    rl_solved_camera camera;    /* from `position` */
+    double x, y, width, height; /* of the display window */
 } rl_probe;
 
 /* `m` has its layers bound; without `depth` only the header is looked at. `position`
