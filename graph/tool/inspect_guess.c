@@ -1,4 +1,4 @@
-#include "graph/tool/inspect_guess.h"
+#include "graph/tool/inspect_parts.h"
 
 #include <math.h>
 #include <string.h>
@@ -6,37 +6,14 @@
 #include "graph/base/file.h"
 #include "graph/run/camera_header.h"
 #include "graph/run/data_files.h"
-#include "graph/tool/guess.h"
-#include "graph/tool/probe.h"
 
 static const double pi = 3.14159265358979323846;
-
-/* Where a channel is. */
-typedef struct source {
-    int pattern;
-    const char *part, *name;
-} source;
-
-/* What is known while a guess is made. */
-typedef struct guesser {
-    rl_arena *arena;
-    rl_channel *channels; /* by which names layers are looked for, */
-    source *sources;      /* and where they are */
-    size_t n;
-    const char *preset; /* whose conventions are taken; NULL: none fits well enough */
-    rl_manifest *m;
-    unsigned named; /* layers that were chosen by their names alone: 1 << id */
-    bool positions;
-    rl_guess position;
-    rl_probe probe;
-    rl_error unread; /* why the pixels could not be looked at */
-} guesser;
 
 /* ---- layers ----------------------------------------------------------------------------------------------
  */
 
 /* rl_guess_layer, with the channels' own names. */
-static bool guess_layer(const guesser *g, rl_layer_id id, rl_guess *out)
+static bool guess_layer(const rl_guesser *g, rl_layer_id id, rl_guess *out)
 {
     if (!rl_guess_layer(id, g->channels, g->n, out))
         return false;
@@ -53,7 +30,7 @@ static bool guess_layer(const guesser *g, rl_layer_id id, rl_guess *out)
 }
 
 /* A layer by the likeliest names, with the conventions that most renderers have. */
-static rl_code add_layer(guesser *g, rl_layer_id id, rl_error *err)
+static rl_code add_layer(rl_guesser *g, rl_layer_id id, rl_error *err)
 {
     rl_guess guess = {0};
     bool found = guess_layer(g, id, &guess);
@@ -96,7 +73,7 @@ static bool looks_along_z(const rl_exr *file)
 }
 
 /* What is required and not there yet. */
-static rl_code add_layers(guesser *g, rl_error *err)
+static rl_code add_layers(rl_guesser *g, rl_error *err)
 {
     rl_code code = RL_OK;
     for (int id = 0; id < RL_LAYER_COUNT && !code; id++)
@@ -106,7 +83,7 @@ static rl_code add_layers(guesser *g, rl_error *err)
 }
 
 /* The manifest of a file that lacks something, or that no preset knows. */
-static rl_code make_manifest(guesser *g, const rl_exr *file, rl_error *err)
+static rl_code make_manifest(rl_guesser *g, const rl_exr *file, rl_error *err)
 {
     const char *presets = rl_data_path(g->arena, "presets"), *path = g->m->patterns[0].path;
     rl_preset_match match;
@@ -134,7 +111,7 @@ static bool same_camera(const rl_solved_camera *a, const rl_solved_camera *b)
 }
 
 /* Cameras found from positions go into the manifest: one, or one a frame where they differ. */
-static rl_code set_cameras(guesser *g, rl_error *err)
+static rl_code set_cameras(rl_guesser *g, rl_error *err)
 {
     rl_camera_spec *c = &g->m->camera;
     size_t n = g->m->frames.n;
@@ -176,160 +153,8 @@ static rl_code set_cameras(guesser *g, rl_error *err)
     return RL_OK;
 }
 
-/* ---- comments --------------------------------------------------------------------------------------------
- */
-
-static void say_camera(const guesser *g, rl_str *out)
-{
-    const rl_probe *p = &g->probe;
-    const rl_camera_spec *c = &g->m->camera;
-    if (p->solved && c->matrix_source != RL_SOURCE_HEADER) {
-        rl_str_printf(out, "#   camera: found from depth and %s, %.2g pixels off\n",
-                      g->m->n_patterns > 1 ? rl_path_name(g->m->patterns[g->position.pattern].path)
-                                           : g->position.names[0],
-                      p->camera.error);
-        return;
-    }
-    if (c->matrix_source == RL_SOURCE_HEADER && p->matrix_source)
-        rl_str_printf(out, "#   camera.matrix: the header has %s\n", p->matrix_source);
-    else if (c->matrix_source == RL_SOURCE_HEADER)
-        rl_str_add(
-            out,
-            "#   camera.matrix: the file does not say where the camera is. In place of `header` write 16 "
-            "numbers, world to camera,\n"
-            "#     rows listed, for column vectors; or render the world position, too, and inspect "
-            "finds the camera\n");
-    if (c->fov_source != RL_SOURCE_HEADER || !p->lens_source)
-        return;
-    if (!strcmp(p->lens_source, "screenWindowWidth") && p->lens_width == 1)
-        rl_str_add(out,
-                   "#   camera.fov_x: the file does not say it (screenWindowWidth is 1, what writers leave "
-                   "there). In place of `header` write degrees\n");
-    else
-        rl_str_printf(out, "#   camera.fov_x: the header has %s\n", p->lens_source);
-}
-
-static void say_depth(const guesser *g, rl_str *out)
-{
-    const rl_probe *p = &g->probe;
-    if (!(p->covered > 0))
-        return;
-    rl_str_printf(
-        out, "#   unit: depth goes from %.4g to %.4g, median %.4g, over %.0f %% of the picture; with `unit: ",
-        p->nearest, p->far, p->median, 100 * p->covered);
-    if (g->m->unit == 1)
-        rl_str_add(out, "m` these are metres\n");
-    else
-        rl_str_printf(out, "%g` the median is %.4g m\n", g->m->unit, p->median * g->m->unit);
-}
-
-static void say_normals(const guesser *g, rl_str *out)
-{
-    const rl_layer *normal = rl_manifest_layer(g->m, "normal"), *depth = rl_manifest_layer(g->m, "depth");
-    if (!g->probe.looked_at_normals || !normal || !depth)
-        return;
-    rl_str_add(out, "#   normal: ");
-    if (!rl_normal_check_advice(&g->probe.check, normal, depth, g->m->camera.forward_z, out))
-        rl_str_printf(out, "fits depth and camera, mean cosine %.3f at %zu smooth places",
-                      g->probe.check.cosine, g->probe.check.samples);
-    rl_str_add(out, "\n");
-}
-
-static void say_names(const guesser *g, rl_str *out)
-{
-    static const char *const care[RL_LAYER_COUNT] = {
-        [RL_LAYER_ALBEDO] = "the surface's colour, 0..1 and linear, without light",
-        [RL_LAYER_NORMAL] = "space, encoding and axes are what most renderers have",
-        [RL_LAYER_DEPTH] = "kind and empty are what most renderers have",
-    };
-    for (int i = 0; i < g->m->n_layers; i++) {
-        const rl_layer *l = &g->m->layers[i];
-        if (!(g->named & 1u << l->id))
-            continue;
-        if (!l->n_channels)
-            rl_str_add(out, "#   stencil: no channel is named like an id; so all is one material\n");
-        else
-            rl_str_printf(out, "#   %s: by its name alone%s%s\n", l->name, care[l->id] ? ": " : "",
-                          care[l->id] ? care[l->id] : "");
-    }
-}
-
-static rl_code say_preset(const guesser *g, rl_str *out, rl_error *err)
-{
-    rl_preset_words words;
-    if (!g->preset)
-        return RL_OK;
-    rl_code code = rl_preset_about(g->arena, rl_data_path(g->arena, "presets"), g->preset, &words, err);
-    for (size_t i = 0; i < words.n_check && !code; i++)
-        rl_str_printf(out, "#   %s\n", words.check[i]);
-    return code;
-}
-
-/* Required layers that are in no channel. */
-static void say_missing(const guesser *g, rl_str *out)
-{
-    int missing = 0;
-    for (int id = 0; id < RL_LAYER_COUNT; id++) {
-        const rl_layer_type *type = &rl_layer_types[id];
-        if (!type->required || rl_manifest_layer(g->m, type->name))
-            continue;
-        if (!missing++)
-            rl_str_add(
-                out,
-                "# relit cannot do without these, and no channel is named like them. Where one is, add it "
-                "to layers; else render it:\n");
-        rl_str_printf(out, "#   %s: {channels: [%s]%s}    # %s\n", type->name,
-                      type->channels == 1 ? "NAME" : "NAME.R, NAME.G, NAME.B",
-                      id == RL_LAYER_NORMAL  ? ", space: world, encoding: signed"
-                      : id == RL_LAYER_DEPTH ? ", kind: planar"
-                                             : "",
-                      type->help);
-    }
-}
-
-/* To be saved beside the files: their names in it are without a folder. */
-static rl_code print_manifest(const guesser *g, rl_str *out, rl_error *err)
-{
-    rl_manifest m = *g->m;
-    rl_pattern *patterns = rl_arena_array(g->arena, (size_t)m.n_patterns + 1, sizeof *patterns);
-    if (!patterns)
-        return rl_fail_memory(err, sizeof *patterns);
-    for (int i = 0; i < m.n_patterns; i++) {
-        patterns[i] = m.patterns[i];
-        patterns[i].path = rl_path_name(m.patterns[i].path);
-    }
-    m.patterns = patterns;
-    rl_manifest_print(&m, out);
-    return RL_OK;
-}
-
-static rl_code print_all(const guesser *g, rl_str *out, rl_error *err)
-{
-    const char *folder = rl_path_folder(g->arena, g->m->patterns[0].path);
-    if (!folder)
-        return rl_fail_memory(err, 64);
-    if (g->preset)
-        rl_str_printf(out, "# guessed by preset '%s'%s: ", g->preset, g->named ? " and by names" : "");
-    else
-        rl_str_printf(out, "# no preset fits %s; guessed by names: ",
-                      g->m->n_patterns > 1 ? "these files" : "this file");
-    rl_str_printf(out, "check what follows, then save it as %s/capture.yaml\n", folder);
-    if (g->unread.code)
-        rl_str_printf(out, "#   the first frame's pixels cannot be looked at: %s\n", g->unread.text);
-    say_camera(g, out);
-    say_depth(g, out);
-    say_normals(g, out);
-    say_names(g, out);
-    rl_code code = say_preset(g, out, err);
-    if (!code)
-        code = print_manifest(g, out, err);
-    if (!code)
-        say_missing(g, out);
-    return code;
-}
-
 /* What the pixels tell; when they cannot be read, that is all that they tell. */
-static void look(guesser *g)
+static void look(rl_guesser *g)
 {
     rl_error *err = &g->unread;
     g->positions = guess_layer(g, RL_LAYER_COUNT, &g->position);
@@ -347,13 +172,13 @@ static void look(guesser *g)
 
 /* The channels of the first file of one of the patterns. With `word`, what a channel without a layer in its
  * name is called: "R" of shot_normal.0001.exr is looked for as normal.R. */
-static rl_code add_channels(guesser *g, int pattern, const rl_exr *file, const char *word, rl_error *err)
+static rl_code add_channels(rl_guesser *g, int pattern, const rl_exr *file, const char *word, rl_error *err)
 {
     rl_channel *found;
     size_t n;
     rl_code code = rl_capture_channels(g->arena, file, &found, &n, err);
     rl_channel *channels = code ? NULL : rl_arena_array(g->arena, g->n + n + 1, sizeof *channels);
-    source *sources = code ? NULL : rl_arena_array(g->arena, g->n + n + 1, sizeof *sources);
+    rl_guess_source *sources = code ? NULL : rl_arena_array(g->arena, g->n + n + 1, sizeof *sources);
     if (code || !channels || !sources)
         return code ? code : rl_fail_memory(err, (g->n + n) * sizeof *channels);
     if (g->n) {
@@ -370,7 +195,7 @@ static rl_code add_channels(guesser *g, int pattern, const rl_exr *file, const c
         if (!name || !part || !called || !place)
             return rl_fail_memory(err, 64);
         channels[g->n] = (rl_channel){place, called};
-        sources[g->n++] = (source){pattern, part, name};
+        sources[g->n++] = (rl_guess_source){pattern, part, name};
     }
     g->channels = channels;
     g->sources = sources;
@@ -379,7 +204,7 @@ static rl_code add_channels(guesser *g, int pattern, const rl_exr *file, const c
 
 rl_code rl_inspect_guess(rl_tool *tool, const rl_capture *capture, rl_str *out, rl_error *err)
 {
-    guesser g = {
+    rl_guesser g = {
         .arena = tool->arena, .m = capture->manifest, .preset = capture->missing ? NULL : capture->preset};
     rl_exr *file = NULL;
     char *path = rl_capture_first(tool->arena, capture->manifest, 0);
@@ -393,7 +218,7 @@ rl_code rl_inspect_guess(rl_tool *tool, const rl_capture *capture, rl_str *out, 
         rl_capture_name_ids(tool->arena, g.m, &(rl_error){0});
     if (!code)
         look(&g);
-    return code ? code : print_all(&g, out, err);
+    return code ? code : rl_inspect_say(&g, out, err);
 }
 
 /* "shot_world-normal" -> "normal": what a file is called after the last separator. */
@@ -406,7 +231,7 @@ static const char *last_word(const char *name)
 }
 
 /* What the names of all files begin with, up to a separator; NULL when that is nothing. */
-static const char *common_name(guesser *g, const char *a, const char *b)
+static const char *common_name(rl_guesser *g, const char *a, const char *b)
 {
     size_t n = 0;
     while (a && b && a[n] && a[n] == b[n])
@@ -417,7 +242,7 @@ static const char *common_name(guesser *g, const char *a, const char *b)
 }
 
 /* Layers of the same frames in several files: one manifest for all. */
-static rl_code make_map(guesser *g, const char *const *paths, size_t n, const char *name, rl_error *err)
+static rl_code make_map(rl_guesser *g, const char *const *paths, size_t n, const char *name, rl_error *err)
 {
     rl_guess depth = {0};
     rl_pattern *patterns = rl_arena_array(g->arena, n, sizeof *patterns);
@@ -444,7 +269,7 @@ static rl_code make_map(guesser *g, const char *const *paths, size_t n, const ch
 
 rl_code rl_inspect_guess_files(rl_tool *tool, const char *const *paths, size_t n, rl_str *out, rl_error *err)
 {
-    guesser g = {.arena = tool->arena};
+    rl_guesser g = {.arena = tool->arena};
     const char *name = NULL;
     rl_code code = RL_OK;
     for (size_t i = 0; i < n && !code; i++) {
@@ -466,5 +291,5 @@ rl_code rl_inspect_guess_files(rl_tool *tool, const char *const *paths, size_t n
         rl_capture_name_ids(g.arena, g.m, &(rl_error){0});
         look(&g);
     }
-    return code ? code : print_all(&g, out, err);
+    return code ? code : rl_inspect_say(&g, out, err);
 }
