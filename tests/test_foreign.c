@@ -255,6 +255,10 @@ static void expect_warning(foreign_kind kind, const char *find, const char *put,
     else
         assert_string_equal(r.err, "");
     tool_result_free(&r);
+    r = RUN("inspect", folder); /* the manifest is looked at in the same way */
+    expect(&r, 0);
+    has(r.out, words ? words : "normal: fits depth and camera");
+    tool_result_free(&r);
     free(pipe);
     free(out);
     free(wrong);

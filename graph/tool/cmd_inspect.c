@@ -120,6 +120,7 @@ static rl_code print_mapping(rl_tool *tool, const rl_capture *capture, rl_str *o
     if (!capture->file)
         return rl_inspect_guess(tool, capture, out, err);
     rl_str_printf(out, "# %s, as relit reads it\n", capture->file);
+    rl_inspect_look(tool, capture->manifest, out);
     rl_manifest_print(capture->manifest, out);
     return RL_OK;
 }

@@ -293,3 +293,29 @@ rl_code rl_inspect_guess_files(rl_tool *tool, const char *const *paths, size_t n
     }
     return code ? code : rl_inspect_say(&g, out, err);
 }
+
+/* As a run does it; a file that is missing or lacks something is what a run would complain about. */
+static void bind(rl_tool *tool, rl_manifest *m)
+{
+    for (int p = 0; p < m->n_patterns && m->preset; p++) {
+        rl_exr *file = NULL;
+        rl_channel *channels;
+        size_t n;
+        rl_error ignored = {0};
+        char *path = rl_capture_first(tool->arena, m, p);
+        if (path && !rl_exr_open(path, 0, &file, &ignored) &&
+            !rl_capture_channels(tool->arena, file, &channels, &n, &ignored))
+            rl_manifest_bind(tool->arena, m, p, path, channels, n, &ignored);
+        rl_exr_close(&file);
+    }
+}
+
+void rl_inspect_look(rl_tool *tool, rl_manifest *m, rl_str *out)
+{
+    rl_guesser g = {.arena = tool->arena, .m = m};
+    if (!m->n_patterns)
+        return;
+    bind(tool, m);
+    rl_probe_run(m, NULL, tool->arena, &g.probe, &g.unread);
+    rl_inspect_say_pixels(&g, out);
+}

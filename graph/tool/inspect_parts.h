@@ -29,5 +29,7 @@ typedef struct rl_guesser {
 
 /* The manifest, with comments that say what was found, what to check, and what is missing. */
 rl_code rl_inspect_say(const rl_guesser *g, rl_str *out, rl_error *err);
+/* Of that, only what the first frame's header and pixels tell of camera, depth and normals. */
+void rl_inspect_say_pixels(const rl_guesser *g, rl_str *out);
 
 #endif

@@ -10,6 +10,8 @@ static void say_camera(const rl_guesser *g, rl_str *out)
 {
     const rl_probe *p = &g->probe;
     const rl_camera_spec *c = &g->m->camera;
+    if (!p->lens_source) /* no header was read */
+        return;
     if (p->solved && c->matrix_source != RL_SOURCE_HEADER) {
         rl_str_printf(out, "#   camera: found from depth and %s, %.2g pixels off\n",
                       g->m->n_patterns > 1 ? rl_path_name(g->m->patterns[g->position.pattern].path)
@@ -26,7 +28,7 @@ static void say_camera(const rl_guesser *g, rl_str *out)
             "numbers, world to camera,\n"
             "#     rows listed, for column vectors; or render the world position, too, and inspect "
             "finds the camera\n");
-    if (c->fov_source != RL_SOURCE_HEADER || !p->lens_source)
+    if (c->fov_source != RL_SOURCE_HEADER)
         return;
     if (!strcmp(p->lens_source, "screenWindowWidth") && p->lens_width == 1)
         rl_str_add(out,
@@ -130,6 +132,15 @@ static rl_code print_manifest(const rl_guesser *g, rl_str *out, rl_error *err)
     return RL_OK;
 }
 
+void rl_inspect_say_pixels(const rl_guesser *g, rl_str *out)
+{
+    if (g->unread.code)
+        rl_str_printf(out, "#   the first frame's pixels cannot be looked at: %s\n", g->unread.text);
+    say_camera(g, out);
+    say_depth(g, out);
+    say_normals(g, out);
+}
+
 rl_code rl_inspect_say(const rl_guesser *g, rl_str *out, rl_error *err)
 {
     const char *folder = rl_path_folder(g->arena, g->m->patterns[0].path);
@@ -141,11 +152,7 @@ rl_code rl_inspect_say(const rl_guesser *g, rl_str *out, rl_error *err)
         rl_str_printf(out, "# no preset fits %s; guessed by names: ",
                       g->m->n_patterns > 1 ? "these files" : "this file");
     rl_str_printf(out, "check what follows, then save it as %s/capture.yaml\n", folder);
-    if (g->unread.code)
-        rl_str_printf(out, "#   the first frame's pixels cannot be looked at: %s\n", g->unread.text);
-    say_camera(g, out);
-    say_depth(g, out);
-    say_normals(g, out);
+    rl_inspect_say_pixels(g, out);
     say_names(g, out);
     rl_code code = say_preset(g, out, err);
     if (!code)
