@@ -52,6 +52,20 @@ static void say_depth(const rl_guesser *g, rl_str *out)
         rl_str_printf(out, "%g` the median is %.4g m\n", g->m->unit, p->median * g->m->unit);
 }
 
+/* No surface sends back more than it gets; and few pictures are of soot alone. */
+static void say_albedo(const rl_guesser *g, rl_str *out)
+{
+    const rl_probe *p = &g->probe;
+    if (!p->has_albedo)
+        return;
+    rl_str_printf(out, "#   albedo: mean %.3g, greatest %.3g", p->albedo_mean, p->albedo_most);
+    if (p->albedo_most > 1.02)
+        rl_str_add(out, ": more than 1 is clamped; is it lit, or another colour space?");
+    else if (p->albedo_mean < 0.005)
+        rl_str_add(out, ": nearly black; is it exposed, or another layer?");
+    rl_str_add(out, "\n");
+}
+
 static void say_normals(const rl_guesser *g, rl_str *out)
 {
     const rl_layer *normal = rl_manifest_layer(g->m, "normal"), *depth = rl_manifest_layer(g->m, "depth");
@@ -138,6 +152,7 @@ void rl_inspect_say_pixels(const rl_guesser *g, rl_str *out)
         rl_str_printf(out, "#   the first frame's pixels cannot be looked at: %s\n", g->unread.text);
     say_camera(g, out);
     say_depth(g, out);
+    say_albedo(g, out);
     say_normals(g, out);
 }
 

@@ -18,7 +18,7 @@ typedef struct looked {
     rl_exr *file;
     int part; /* that holds depth */
     size_t width, height;
-    float *depth, *normal[3], *position[3];
+    float *depth, *normal[3], *position[3], *albedo[3];
 } looked;
 
 /* The part that holds a channel, or -1. */
@@ -98,6 +98,25 @@ static rl_code look_at_depth(const looked *l, const rl_layer *layer, rl_probe *o
     return RL_OK;
 }
 
+/* As the file has it, in whatever colour space. Before the depth is converted. */
+static void look_at_albedo(const looked *l, const rl_layer *depth, rl_probe *out)
+{
+    double sum = 0;
+    size_t n = 0;
+    for (size_t i = 0; i < l->width * l->height; i++) {
+        if (rl_layer_is_empty(depth, (double)l->depth[i]) || l->depth[i] > 1e30f)
+            continue;
+        for (int k = 0; k < 3; k++) {
+            double v = (double)l->albedo[k][i];
+            sum += v;
+            out->albedo_most = v > out->albedo_most ? v : out->albedo_most;
+        }
+        n += 3;
+    }
+    out->has_albedo = n > 0;
+    out->albedo_mean = n ? sum / (double)n : 0;
+}
+
 /* The camera of the first frame as a run would take it, when there is one. */
 static bool find_camera(const looked *l, rl_probe *out, camera_t *camera)
 {
@@ -168,6 +187,7 @@ rl_code rl_probe_run(const rl_manifest *m, const rl_guess *position, rl_arena *a
                      rl_error *err)
 {
     const rl_layer *depth = rl_manifest_layer(m, "depth"), *normal = rl_manifest_layer(m, "normal");
+    const rl_layer *albedo = rl_manifest_layer(m, "albedo");
     looked l = {.m = m, .arena = arena};
     camera_t camera;
     *out = (rl_probe){0};
@@ -183,6 +203,10 @@ rl_code rl_probe_run(const rl_manifest *m, const rl_guess *position, rl_arena *a
                            err);
     if (!code && depth && position)
         code = read_planes(&l, position->pattern, position->part, position->names, 3, l.position, err);
+    if (!code && depth && albedo)
+        code = read_planes(&l, albedo->pattern, albedo->part, albedo->channels, 3, l.albedo, err);
+    if (!code && depth && albedo)
+        look_at_albedo(&l, depth, out);
     if (!code && depth)
         code = look_at_depth(&l, depth, out, err);
     if (!code && depth && position)
@@ -193,6 +217,7 @@ rl_code rl_probe_run(const rl_manifest *m, const rl_guess *position, rl_arena *a
     for (int k = 0; k < 3; k++) {
         rl_free(l.normal[k]);
         rl_free(l.position[k]);
+        rl_free(l.albedo[k]);
     }
     rl_exr_close(&l.file);
     return code;
