@@ -14,6 +14,7 @@
 #include "graph/base/alloc.h"
 #include "graph/run/camera_header.h"
 #include "graph/tool/camera_solve.h"
+#include "graph/tool/guess.h"
 #include "tests/foreign_scene.h"
 #include "tests/tool_run.h"
 
@@ -326,6 +327,77 @@ static void test_messages(void **state)
                    "'axes': expected three of x, y, z");
 }
 
+/* ---- names -----------------------------------------------------------------------------------------------
+ */
+
+/* Channels of a file, and what albedo, normal, depth, stencil and position are taken for ("" = nothing is
+ * like it). */
+static const struct names {
+    const char *channels[48];
+    const char *found[5];
+} names[] = {
+    /* Redshift */
+    {{"A",
+      "B",
+      "Cryptomatte00.A",
+      "Cryptomatte00.B",
+      "Cryptomatte00.G",
+      "Cryptomatte00.R",
+      "Cryptomatte01.R",
+      "DiffuseFilter.B",
+      "DiffuseFilter.G",
+      "DiffuseFilter.R",
+      "DiffuseLighting.B",
+      "DiffuseLighting.G",
+      "DiffuseLighting.R",
+      "G",
+      "N.B",
+      "N.G",
+      "N.R",
+      "P.B",
+      "P.G",
+      "P.R",
+      "R",
+      "Z",
+      NULL},
+     {"DiffuseFilter.R", "N.R", "Z", "Cryptomatte00.R", "P.R"}},
+    /* LuxCore */
+    {{"ALBEDO.B", "ALBEDO.G", "ALBEDO.R", "DEPTH.Z", "GEOMETRY_NORMAL.X", "GEOMETRY_NORMAL.Y",
+      "GEOMETRY_NORMAL.Z", "MATERIAL_ID.V", "POSITION.X", "POSITION.Y", "POSITION.Z", NULL},
+     {"ALBEDO.R", "GEOMETRY_NORMAL.X", "DEPTH.Z", "MATERIAL_ID.V", "POSITION.X"}},
+    /* RenderMan: lower case */
+    {{"a", "albedo.b", "albedo.g", "albedo.r", "b", "g", "__Nworld.b", "__Nworld.g", "__Nworld.r",
+      "__Pworld.b", "__Pworld.g", "__Pworld.r", "r", "z", NULL},
+     {"albedo.r", "__Nworld.r", "z", "", "__Pworld.r"}},
+    /* Karma */
+    {{"A", "B", "CryptoMaterial00.A", "CryptoMaterial00.B", "CryptoMaterial00.G", "CryptoMaterial00.R", "G",
+      "N.x", "N.y", "N.z", "P.x", "P.y", "P.z", "R", "albedo.B", "albedo.G", "albedo.R", "depth.Z", NULL},
+     {"albedo.R", "N.x", "depth.Z", "CryptoMaterial00.R", "P.x"}},
+    /* lit layers, an id as colours, a matte: nothing that is of use */
+    {{"diffuse_direct.B", "diffuse_direct.G", "diffuse_direct.R", "MultiMatte.B", "MultiMatte.G",
+      "MultiMatte.R", "alpha.A", "lens.Y", NULL},
+     {"", "", "", "", ""}},
+};
+
+static void test_names(void **state)
+{
+    (void)state;
+    static const rl_layer_id ids[] = {RL_LAYER_ALBEDO, RL_LAYER_NORMAL, RL_LAYER_DEPTH, RL_LAYER_STENCIL,
+                                      RL_LAYER_COUNT};
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
+        rl_channel channels[48];
+        size_t n = 0;
+        for (; names[i].channels[n]; n++)
+            channels[n] = (rl_channel){NULL, names[i].channels[n]};
+        for (int k = 0; k < 5; k++) {
+            rl_guess guess;
+            const char *got = rl_guess_layer(ids[k], channels, n, &guess) ? guess.names[0] : "";
+            if (strcmp(got, names[i].found[k]))
+                fail_msg("list %zu, layer %d: '%s' instead of '%s'", i, k, got, names[i].found[k]);
+        }
+    }
+}
+
 /* ---- cameras ---------------------------------------------------------------------------------------------
  */
 
@@ -501,13 +573,14 @@ static void test_first_steps(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_blender),  cmocka_unit_test(test_arnold),
-        cmocka_unit_test(test_unreal),   cmocka_unit_test(test_pbrt),
-        cmocka_unit_test(test_vray),     cmocka_unit_test(test_unknown),
-        cmocka_unit_test(test_shift),    cmocka_unit_test(test_conventions),
-        cmocka_unit_test(test_messages), cmocka_unit_test(test_first_steps),
-        cmocka_unit_test(test_torn),     cmocka_unit_test(test_solve),
-        cmocka_unit_test(test_headers),  cmocka_unit_test(test_failing_memory),
+        cmocka_unit_test(test_blender),        cmocka_unit_test(test_arnold),
+        cmocka_unit_test(test_unreal),         cmocka_unit_test(test_pbrt),
+        cmocka_unit_test(test_vray),           cmocka_unit_test(test_unknown),
+        cmocka_unit_test(test_shift),          cmocka_unit_test(test_conventions),
+        cmocka_unit_test(test_messages),       cmocka_unit_test(test_first_steps),
+        cmocka_unit_test(test_torn),           cmocka_unit_test(test_names),
+        cmocka_unit_test(test_solve),          cmocka_unit_test(test_headers),
+        cmocka_unit_test(test_failing_memory),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
