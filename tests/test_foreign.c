@@ -184,6 +184,19 @@ static void test_unknown(void **state)
                                   NULL});
 }
 
+/* A name that no material can have stays beside its id. */
+static void test_init_names(void **state)
+{
+    (void)state;
+    char *manifest, *folder = make(FOREIGN_BLENDER, 0, &manifest);
+    tool_result r = RUN("init", folder);
+    expect(&r, 0);
+    has(r.out, "  id-317341308: {stencil: 317341308}    # \"red ball\"\n  floor: {stencil: 3410176152}\n");
+    tool_result_free(&r);
+    free(manifest);
+    folder_remove(folder);
+}
+
 /* The lens's shift is in Arnold's worldToNDC, and in what Blender's positions tell. */
 static void test_shift(void **state)
 {
@@ -573,14 +586,14 @@ static void test_first_steps(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_blender),        cmocka_unit_test(test_arnold),
-        cmocka_unit_test(test_unreal),         cmocka_unit_test(test_pbrt),
-        cmocka_unit_test(test_vray),           cmocka_unit_test(test_unknown),
-        cmocka_unit_test(test_shift),          cmocka_unit_test(test_conventions),
-        cmocka_unit_test(test_messages),       cmocka_unit_test(test_first_steps),
-        cmocka_unit_test(test_torn),           cmocka_unit_test(test_names),
-        cmocka_unit_test(test_solve),          cmocka_unit_test(test_headers),
-        cmocka_unit_test(test_failing_memory),
+        cmocka_unit_test(test_blender),    cmocka_unit_test(test_arnold),
+        cmocka_unit_test(test_unreal),     cmocka_unit_test(test_pbrt),
+        cmocka_unit_test(test_vray),       cmocka_unit_test(test_unknown),
+        cmocka_unit_test(test_shift),      cmocka_unit_test(test_conventions),
+        cmocka_unit_test(test_messages),   cmocka_unit_test(test_first_steps),
+        cmocka_unit_test(test_torn),       cmocka_unit_test(test_names),
+        cmocka_unit_test(test_init_names), cmocka_unit_test(test_solve),
+        cmocka_unit_test(test_headers),    cmocka_unit_test(test_failing_memory),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -231,6 +231,10 @@ static void add_materials(rl_str *out, const rl_manifest *m, const uint32_t *ids
         rl_str_printf(out, ": {stencil: %lld}", id);
         if (g)
             rl_str_printf(out, "    # {stencil: %lld, profile: %s}", id, g->profile);
+        if (!is_name(name)) {
+            rl_str_add(out, g ? ", " : "    # ");
+            add_text(out, name);
+        }
         rl_str_add(out, "\n");
     }
     for (size_t i = 0; i < n_ids; i++)
