@@ -184,6 +184,37 @@ static void test_unknown(void **state)
                                   NULL});
 }
 
+/* Depth as view space has it in OpenGL: -z. */
+static void test_negated(void **state)
+{
+    (void)state;
+    char *folder = folder_new(), *file = path_in(folder, "shot.0007.exr");
+    foreign_scene *s = foreign_scene_new(0);
+    for (int k = 0; k < FOREIGN_PIXELS; k++)
+        s->depth[k] = -s->depth[k];
+    foreign_write(file, s, FOREIGN_RELIT);
+    tool_result r = RUN("inspect", folder);
+    expect(&r, 0);
+    has(r.out, "depth: no pixel shows a surface: the channel goes from -1e+10 to -");
+    has(r.out, "; with layers.depth.negated: true, -z becomes z");
+    char *right = text_replace(r.out, "kind: planar", "kind: planar, negated: true");
+    file_write(folder, "capture.yaml", right, strlen(right));
+    tool_result_free(&r);
+    r = RUN("inspect", folder);
+    expect(&r, 0);
+    has(r.out, "kind: planar, negated: true, empty: 1e10");
+    has(r.out, "normal: fits depth and camera");
+    tool_result_free(&r);
+    float *want = truth(), *got = relight(folder, FOREIGN_RELIT);
+    expect_same(got, want, 2e-4);
+    free(want);
+    free(got);
+    free(right);
+    free(s);
+    free(file);
+    folder_remove(folder);
+}
+
 /* A name that no material can have stays beside its id. */
 static void test_init_names(void **state)
 {
@@ -288,6 +319,7 @@ static void test_conventions(void **state)
     has(manifest, "albedo: mean 0.5, greatest 0.7\n");
     free(manifest);
     folder_remove(folder);
+    expect_warning(FOREIGN_RELIT, "kind: planar", "kind: planar, negated: true", "no pixel shows a surface");
     expect_warning(FOREIGN_RELIT, "space: world", "space: camera",
                    "with layers.normal.space: world in the manifest");
     expect_warning(FOREIGN_RELIT, "forward: -z", "forward: +z", "with camera.forward: -z in the manifest");
@@ -586,14 +618,15 @@ static void test_first_steps(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_blender),    cmocka_unit_test(test_arnold),
-        cmocka_unit_test(test_unreal),     cmocka_unit_test(test_pbrt),
-        cmocka_unit_test(test_vray),       cmocka_unit_test(test_unknown),
-        cmocka_unit_test(test_shift),      cmocka_unit_test(test_conventions),
-        cmocka_unit_test(test_messages),   cmocka_unit_test(test_first_steps),
-        cmocka_unit_test(test_torn),       cmocka_unit_test(test_names),
-        cmocka_unit_test(test_init_names), cmocka_unit_test(test_solve),
-        cmocka_unit_test(test_headers),    cmocka_unit_test(test_failing_memory),
+        cmocka_unit_test(test_blender),        cmocka_unit_test(test_arnold),
+        cmocka_unit_test(test_unreal),         cmocka_unit_test(test_pbrt),
+        cmocka_unit_test(test_vray),           cmocka_unit_test(test_unknown),
+        cmocka_unit_test(test_shift),          cmocka_unit_test(test_conventions),
+        cmocka_unit_test(test_messages),       cmocka_unit_test(test_first_steps),
+        cmocka_unit_test(test_torn),           cmocka_unit_test(test_names),
+        cmocka_unit_test(test_negated),        cmocka_unit_test(test_init_names),
+        cmocka_unit_test(test_solve),          cmocka_unit_test(test_headers),
+        cmocka_unit_test(test_failing_memory),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

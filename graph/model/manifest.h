@@ -83,6 +83,7 @@ typedef struct rl_layer {
     bool hashed;          /* stencil: Cryptomatte, the bits of a float are the id */
     uint32_t constant;    /* stencil: the id of all pixels, when n_channels is 0 */
     double near_m, far_m; /* RL_DEPTH_DEVICE; metres, 0 < near < far, far may be infinite */
+    bool negated;         /* depths: the file has -z, as view space looks down -z; all below is of +z */
     bool reversed;        /* RL_DEPTH_DEVICE: 1 at the near plane */
     double empty;         /* the file's value from which on (reversed: down to which) a pixel is empty */
     double scale;         /* lengths: metres a unit of the file; curvature: 1/m a unit */

@@ -12,7 +12,7 @@ const rl_layer_type rl_layer_types[RL_LAYER_COUNT] = {
     [RL_LAYER_NORMAL] = {"normal", RL_NORMAL, 3, .required = true, .keys = {"space", "encoding", "axes"},
                          .help = "unit shading normal"},
     [RL_LAYER_DEPTH] = {"depth", RL_SCALAR, 1, .required = true,
-                        .keys = {"kind", "near", "far", "reversed", "empty", "unit"},
+                        .keys = {"kind", "near", "far", "reversed", "empty", "unit", "negated"},
                         .help = "distance along the view axis"},
     [RL_LAYER_STENCIL] = {"stencil", RL_ID, 1, .required = true, .keys = {"encoding", "constant"},
                           .help = "material id, any 32-bit integer"},
@@ -32,7 +32,7 @@ const rl_layer_type rl_layer_types[RL_LAYER_COUNT] = {
     [RL_LAYER_CURVATURE] = {"curvature", RL_SCALAR, 1, .keys = {"unit"},
                             .help = "mean curvature, 1 / length, convex positive"},
     [RL_LAYER_BACK_DEPTH] = {"back_depth", RL_SCALAR, 1,
-                             .keys = {"kind", "near", "far", "reversed", "empty", "unit"},
+                             .keys = {"kind", "near", "far", "reversed", "empty", "unit", "negated"},
                              .help = "depth of the closest back face, empty where there is none"},
     [RL_LAYER_BACK_NORMAL] = {"back_normal", RL_NORMAL, 3, .keys = {"space", "encoding", "axes"},
                               .help = "normal of the closest back face, out of the object"},
@@ -185,6 +185,7 @@ static rl_code read_depth(const layer_reader *l)
     static const char *const device_keys[] = {"near", "far", "reversed"};
     rl_error *err = l->r->err;
     const rl_value *kind = stated(l, "kind", "planar"), *empty = rl_value_get(l->map, "empty");
+    const rl_value *negated = rl_value_get(l->map, "negated");
     int word = 0;
     rl_code code = kind ? rl_value_word(kind, "kind", "planar|radial|device", &word, err) : RL_OK;
     l->layer->kind = (rl_depth_kind)word;
@@ -197,6 +198,8 @@ static rl_code read_depth(const layer_reader *l)
     }
     if (!code && word == RL_DEPTH_DEVICE)
         code = read_device(l);
+    if (!code && negated)
+        code = rl_value_truth(negated, "negated", &l->layer->negated, err);
     if (!code && empty)
         code = rl_value_number(empty, "empty", -INFINITY, INFINITY, &l->layer->empty, err);
     return code;
@@ -335,6 +338,7 @@ rl_code rl_manifest_read_layers(rl_manifest_reader *r, const rl_value *v)
 
 double rl_layer_depth(const rl_layer *layer, double raw, double slope)
 {
+    raw = layer->negated ? -raw : raw;
     switch (layer->kind) {
     case RL_DEPTH_PLANAR:
         return raw * layer->scale;
@@ -354,6 +358,7 @@ bool rl_layer_is_empty(const rl_layer *layer, double raw)
 {
     if (!isfinite(raw))
         return true;
+    raw = layer->negated ? -raw : raw;
     if (layer->kind == RL_DEPTH_DEVICE)
         return layer->reversed ? raw <= layer->empty : raw >= layer->empty;
     return raw >= layer->empty || raw <= 0;

@@ -82,6 +82,8 @@ static void print_depth(const rl_layer *l, rl_str *s)
         print_number(s, l->far_m / l->scale);
         rl_str_printf(s, ", reversed: %s", l->reversed ? "true" : "false");
     }
+    if (l->negated)
+        rl_str_add(s, ", negated: true");
     if (isfinite(l->empty)) {
         rl_str_add(s, ", empty: ");
         print_number(s, l->empty);

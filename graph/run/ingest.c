@@ -39,9 +39,9 @@ uint64_t rl_ingest_scalar(float *plane, rl_rows rows, float scale, float offset,
 WIDE static void planar_row(float *row, int width, const rl_layer *layer)
 {
     float scale = (float)layer->scale;
-    float empty = layer->empty < 3.4e38 ? (float)layer->empty : 3.4e38f;
+    float empty = layer->empty < 3.4e38 ? (float)layer->empty : 3.4e38f, sign = layer->negated ? -1.0f : 1.0f;
     for (int x = 0; x < width; x++) {
-        float v = row[x];
+        float v = row[x] * sign;
         row[x] = v > 0 && v < empty ? v * scale : 0.0f;
     }
 }

@@ -111,15 +111,37 @@ static rl_code collect_group(rl_reader *r, rl_frame *f, bool *done, int first, g
     return code;
 }
 
+/* A picture of nothing is a wrong layer as a rule. */
+static bool is_empty(const rl_frame *f, const float *depth)
+{
+    for (int y = 0; y < f->geometry.height; y++)
+        for (int x = 0; x < f->geometry.width; x++)
+            if (depth[(size_t)y * (size_t)f->geometry.stride + (size_t)x] > 0)
+                return false;
+    return true;
+}
+
 /* Whether the capture's conventions can be right, in the first frame that is read. */
 static void check_normals(rl_reader *r, const rl_frame *f, const rl_frame_maps *maps)
 {
     int normal = -1;
     for (int i = 0; i < r->n_bindings; i++)
         normal = r->bindings[i].layer->id == RL_LAYER_NORMAL ? i : normal;
-    if (r->said_normals || normal < 0)
+    if (r->said_normals)
         return;
+    if (is_empty(f, maps->base[r->depth][0])) { /* the next frame may tell more */
+        if (!r->said_empty)
+            rl_report(
+                r->setup.log, RL_WARNING, r->bindings[r->depth].layer->where,
+                "frame %d: no pixel shows a surface: the depth is nowhere above 0 and below `empty` (where a "
+                "file has -z, write layers.depth.negated: true)",
+                f->number);
+        r->said_empty = true;
+        return;
+    }
     r->said_normals = true;
+    if (normal < 0)
+        return;
     rl_normal_view view = {.depth = maps->base[r->depth][0],
                            .stride = (size_t)f->geometry.stride,
                            .width = f->geometry.width,

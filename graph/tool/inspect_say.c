@@ -41,6 +41,14 @@ static void say_camera(const rl_guesser *g, rl_str *out)
 static void say_depth(const rl_guesser *g, rl_str *out)
 {
     const rl_probe *p = &g->probe;
+    const rl_layer *depth = rl_manifest_layer(g->m, "depth");
+    if (!(p->covered > 0) && depth && !g->unread.code) {
+        rl_str_printf(out, "#   depth: no pixel shows a surface: the channel goes from %.4g to %.4g",
+                      p->least, p->most);
+        rl_str_add(out, p->most <= 0 && p->least < 0 && !depth->negated
+                            ? "; with layers.depth.negated: true, -z becomes z\n"
+                            : "; check layers.depth (channels, empty, negated)\n");
+    }
     if (!(p->covered > 0))
         return;
     rl_str_printf(

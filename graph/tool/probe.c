@@ -84,9 +84,13 @@ static rl_code look_at_depth(const looked *l, const rl_layer *layer, rl_probe *o
     float *sorted = rl_malloc((pixels + 1) * sizeof *sorted);
     if (!sorted)
         return rl_fail_memory(err, pixels * sizeof *sorted);
-    for (size_t i = 0; i < pixels; i++)
-        if (!rl_layer_is_empty(layer, (double)l->depth[i]) && l->depth[i] < 1e30f)
-            sorted[n++] = l->depth[i];
+    for (size_t i = 0; i < pixels; i++) {
+        double v = (double)l->depth[i];
+        out->least = v < out->least || !i ? v : out->least;
+        out->most = v < 1e30 && (v > out->most || !i) ? v : out->most;
+        if (!rl_layer_is_empty(layer, v) && fabs(v) < 1e30)
+            sorted[n++] = layer->negated ? -l->depth[i] : l->depth[i];
+    }
     qsort(sorted, n, sizeof *sorted, by_value);
     out->covered = pixels ? (double)n / (double)pixels : 0;
     if (n) {
@@ -104,7 +108,7 @@ static void look_at_albedo(const looked *l, const rl_layer *depth, rl_probe *out
     double sum = 0;
     size_t n = 0;
     for (size_t i = 0; i < l->width * l->height; i++) {
-        if (rl_layer_is_empty(depth, (double)l->depth[i]) || l->depth[i] > 1e30f)
+        if (rl_layer_is_empty(depth, (double)l->depth[i]) || fabsf(l->depth[i]) > 1e30f)
             continue;
         for (int k = 0; k < 3; k++) {
             double v = (double)l->albedo[k][i];
@@ -171,9 +175,10 @@ static void look_at_positions(const looked *l, const rl_layer *depth, rl_probe *
                y = (2 * (i / SIDE) + 1) * l->height / (2 * SIDE);
         size_t at = y * l->width + x;
         double d = (double)l->depth[at];
-        if (rl_layer_is_empty(depth, d) || d > 1e30)
+        if (rl_layer_is_empty(depth, d) || fabs(d) > 1e30)
             continue;
-        seen[n] = (rl_seen){.x = w.x0 + (double)x + 0.5, .y = w.y0 + (double)y + 0.5, .depth = d};
+        seen[n] = (rl_seen){
+            .x = w.x0 + (double)x + 0.5, .y = w.y0 + (double)y + 0.5, .depth = depth->negated ? -d : d};
         for (int k = 0; k < 3; k++)
             seen[n].world[k] = (double)l->position[k][at];
         n++;

@@ -11,6 +11,7 @@
 typedef struct rl_probe {
     double covered;              /* share of the pixels that are not empty */
     double nearest, median, far; /* their depth in the file's own numbers */
+    double least, most;          /* all that is finite in the depth's channel */
     bool has_albedo;
     double albedo_mean, albedo_most; /* of all three channels, where something is */
     const char *matrix_source; /* what the header says of the camera's place: an attribute's name, or NULL */
