@@ -327,6 +327,8 @@ static void test_conventions(void **state)
                    "with layers.normal.axes: [x, y, z] in the manifest");
     expect_warning(FOREIGN_RELIT, "kind: planar", "kind: radial",
                    "with layers.depth.kind: planar in the manifest");
+    expect_warning(FOREIGN_RELIT, "[normal.X, normal.Y, normal.Z]", "[normal.X, normal.X, normal.X]",
+                   "check layers.normal (space, encoding, axes), layers.depth (kind;");
     expect_warning(FOREIGN_PBRT, "space: camera", "space: world",
                    "with layers.normal.space: camera in the manifest");
     expect_warning(FOREIGN_PBRT, "encoding: signed", "encoding: signed, axes: [x, -y, z]",

@@ -238,8 +238,8 @@ bool rl_normal_check_advice(const rl_normal_check *c, const rl_layer *normal, co
         if (!c->other_space && !c->other_way && normal->space == RL_SPACE_WORLD)
             rl_str_add(out, ", or camera.matrix is of a world with other axes");
     } else {
-        rl_str_add(out, "check layers.normal (space, encoding, axes), layers.depth.kind and camera (matrix, "
-                        "forward, fov_x) in the manifest");
+        rl_str_add(out, "check layers.normal (space, encoding, axes), layers.depth (kind; is it inverted, or "
+                        "clamped?) and camera (matrix, forward, fov_x) in the manifest");
     }
     return true;
 }
