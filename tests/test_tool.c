@@ -694,7 +694,8 @@ static void test_inspect(void **state)
     folder_remove(folder);
 }
 
-/* Channels that no preset knows are found by their names; what is not there is said, and what was put in its place. */
+/* Channels that no preset knows are found by their names; what is not there is said, and what was put in its
+ * place. */
 static void test_inspect_gaps(void **state)
 {
     (void)state;
