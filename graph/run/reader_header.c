@@ -124,7 +124,8 @@ static void report_camera(rl_reader *r, const rl_frame *f, int file_number, cons
     }
 }
 
-/* The file whose header knows the camera: that of the depth, or where that knows nothing, the first that does. */
+/* The file whose header knows the camera: that of the depth, or where that knows nothing, the first that
+ * does. */
 static const rl_exr *camera_file(const rl_reader *r, const rl_frame *f, int *part)
 {
     const bool forward_z = r->setup.manifest->camera.forward_z;
@@ -158,11 +159,11 @@ static rl_code read_camera(rl_reader *r, rl_frame *f, int file_number, rl_error 
     /* The manifest may be a preset's: the file is what to look at. */
     if (r->setup.manifest->camera.matrix_source == RL_SOURCE_HEADER &&
         !rl_camera_header_matrix(file, part, r->setup.manifest->camera.forward_z, matrix))
-        return rl_fail_file(err, RL_E_FORMAT, rl_exr_path(file),
-                            "the file has no attribute worldToCamera; give camera.matrix in the manifest: 16 numbers, "
-                            "world to camera, rows listed, for column vectors (how to get them: configs/captures.md)");
-    rl_code code =
-        rl_camera_read(r->setup.manifest, file_number, file, part, &c, &lens, &has_jitter, &inner);
+        return rl_fail_file(
+            err, RL_E_FORMAT, rl_exr_path(file),
+            "the file has no attribute worldToCamera; give camera.matrix in the manifest: 16 numbers, "
+            "world to camera, rows listed, for column vectors (how to get them: configs/captures.md)");
+    rl_code code = rl_camera_read(r->setup.manifest, file_number, file, part, &c, &lens, &has_jitter, &inner);
     if (!code) {
         report_camera(r, f, file_number, &lens, has_jitter);
         code = rl_camera_make(&c, &f->camera, &inner);
