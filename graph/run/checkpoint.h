@@ -15,8 +15,8 @@ extern "C" {
 /* What decides the bits of a picture besides its inputs: hashes, so that a complaint can say what differs. */
 typedef enum rl_identity_part {
     RL_ID_VERSION,
-    RL_ID_PIPELINE, /* merged content, user kernels' files, --only, --dump, --crop */
-    RL_ID_CAPTURE,  /* the manifest without its paths and its list of frames */
+    RL_ID_PIPELINE, /* its content and that of the files that it names; --only, --dump, --crop */
+    RL_ID_CAPTURE,  /* the manifest without its paths and its list of frames; the colour configuration */
     RL_ID_PLAN,
     RL_ID_KERNELS, /* their texts and tables: colour transforms are in there */
     RL_ID_DEVICE,  /* its name, version and driver */

@@ -15,6 +15,7 @@
 
 #include "graph/base/alloc.h"
 #include "graph/base/file.h"
+#include "graph/run/file_hash.h"
 
 struct rl_ledger {
     rl_arena arena;
@@ -189,36 +190,6 @@ rl_code rl_ledger_write(rl_ledger *l, int frame, rl_ledger_kind kind, uint64_t c
 /* ---- inputs ----------------------------------------------------------------------------------------------
  */
 
-/* Bytes of one file into a running hash. */
-static bool hash_file(XXH3_state_t *hash, const char *path, void *buffer, size_t room)
-{
-    int fd = open(path, O_RDONLY | O_CLOEXEC);
-    ssize_t n = -1;
-    while (fd >= 0 && (n = read(fd, buffer, room)) > 0)
-        XXH3_64bits_update(hash, buffer, (size_t)n);
-    if (fd >= 0)
-        close(fd);
-    return n == 0;
-}
-
-static uint64_t hash_content(const char *const *paths, size_t n, bool *good)
-{
-    enum { ROOM = 1 << 18 }; /* stays in the second-level cache */
-    void *buffer = rl_malloc(ROOM);
-    XXH3_state_t *hash = XXH3_createState();
-    uint64_t content = 0;
-    *good = buffer && hash;
-    if (*good)
-        XXH3_64bits_reset(hash);
-    for (size_t i = 0; i < n && *good; i++)
-        *good = hash_file(hash, paths[i], buffer, ROOM);
-    if (*good)
-        content = XXH3_64bits_digest(hash);
-    XXH3_freeState(hash);
-    rl_free(buffer);
-    return content;
-}
-
 rl_inputs rl_ledger_inputs(rl_ledger *l, int frame, const char *const *paths, size_t n)
 {
     rl_inputs in = {.stat = n};
@@ -236,8 +207,6 @@ rl_inputs rl_ledger_inputs(rl_ledger *l, int frame, const char *const *paths, si
         in.content = known.content;
         return in;
     }
-    bool good;
-    in.content = hash_content(paths, n, &good);
-    in.missing = !good;
+    in.missing = !rl_files_hash(paths, n, &in.content);
     return in;
 }

@@ -54,7 +54,8 @@ typedef struct rl_sequence {
     uint64_t decode_bytes; /* that reading it takes besides its buffers */
     rl_reader *reader;
     rl_executor *executor; /* NULL until prepared */
-    bool has_last;         /* the frame that ran last, and may be the past of the next one */
+    uint64_t content; /* hash of the manifest, without paths and frames, and of the files of its lights */
+    bool has_last;    /* the frame that ran last, and may be the past of the next one */
     int last_number;
     camera_t last_camera;
 } rl_sequence;
@@ -67,6 +68,8 @@ struct rl_session {
     const rl_pipeline *pipeline;
     rl_ocio *ocio;
     const char *working;
+    uint64_t colors;   /* hash of the OCIO configuration and of the files that it names */
+    uint64_t content;  /* hash of the pipeline and of all files that it names, this configuration included */
     ambient_t ambient; /* in the working space */
     float *sky;        /* what surfaces mirror of it (kernels/shared.h), owned; NULL = nothing */
     size_t n_sky;
@@ -112,6 +115,10 @@ void rl_session_light_values(const rl_sequence *sequence, const camera_t *camera
 
 /* session_ambient.c: the pipeline's ambient light; reads its HDRI. */
 rl_code rl_session_ambient(rl_session *session, rl_error *err);
+
+/* session_content.c: finds the hashes of content. After all else: what is missing has been complained about.
+ */
+rl_code rl_session_content(rl_session *session, rl_error *err);
 
 /* session_compared.c: adds the hidden outputs of what is compared. */
 rl_code rl_session_compared(rl_session *session, rl_error *err);
