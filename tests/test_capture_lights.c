@@ -95,6 +95,9 @@ static void test_paths(void **state)
     } rows[] = {
         {{{"lights.rim.enabled", "false"}, {"lights.key.efficacy", "100"}}, 2, SCENE_LIGHTS & ~SCENE_RIM},
         {{{"lights.rim.enabled", "true"}}, 1, SCENE_LIGHTS},
+        {{{"lights.rim", "null"}}, 1, SCENE_LIGHTS & ~SCENE_RIM},
+        {{{"lights.rim.exposure", "1"}, {"lights.rim", "null"}}, 2, SCENE_LIGHTS & ~SCENE_RIM},
+        {{{"lights.rim.efficacy", "null"}}, 1, SCENE_LIGHTS},
         {{{"lights", "{}"}}, 1, 0}};
     static const char *const color[] = {"c.color"};
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
@@ -105,9 +108,41 @@ static void test_paths(void **state)
         scene s = truth(rows[i].lights, SCENE_KEY | SCENE_RIM);
         assert_int_equal(rl_session_process(r, 0, 1, NULL, &err), RL_OK);
         rl_image_view view = capture_image(r, "c.color");
-        assert_true(capture_error(&view, &s, SCENE_COLOR, 3, i < 2 ? 0 : 1) <= 4e-6);
+        assert_true(capture_error(&view, &s, SCENE_COLOR, 3, rows[i].lights ? 0 : 1) <= 4e-6);
         rl_session_close(&r);
         scene_free(&s);
+    }
+}
+
+/* What is not there cannot be removed. */
+static void test_nothing_to_remove(void **state)
+{
+    static const struct {
+        rl_setting set;
+        const char *lights, *says;
+    } rows[] = {
+        {{"lights.rin", "null"}, "", "has no light 'rin' to remove; did you mean 'rim'?"},
+        {{"lights.rin.shadow", "null"}, "", "there is no light 'rin'; did you mean 'rim'?"},
+        {{"lights.rim", "null"}, "lights: {}\n", "--set lights.rim=null removes nothing"},
+        {{"graph.c.gain", "null"}, "", "--set graph.c.gain=null removes nothing"},
+    };
+    (void)state;
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        rl_error err = {0};
+        rl_session *s = NULL;
+        char *pipeline = with(rows[i].lights);
+        const rl_options options = {.pipeline_text = pipeline,
+                                    .captures = (const char *const[]){folder},
+                                    .n_captures = 1,
+                                    .settings = &rows[i].set,
+                                    .n_settings = 1,
+                                    .log = &capture_logger};
+        capture_log_clear();
+        assert_int_equal(rl_session_open(&options, &s, &err), i < 2 ? RL_E_CONFIG : RL_OK);
+        if (!strstr(i < 2 ? err.text : capture_log(), rows[i].says))
+            fail_msg("\"%s\" is not in \"%s%s\"", rows[i].says, err.text, capture_log());
+        rl_session_close(&s);
+        free(pipeline);
     }
 }
 
@@ -409,12 +444,19 @@ static void test_memory_without_name(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_paths),          cmocka_unit_test(test_photometric),
-        cmocka_unit_test(test_sphere),         cmocka_unit_test(test_shadows),
-        cmocka_unit_test(test_no_such_shadow), cmocka_unit_test(test_renamed_layers),
-        cmocka_unit_test(test_camera_space),   cmocka_unit_test(test_working_space),
-        cmocka_unit_test(test_bare),           cmocka_unit_test(test_preset_inline),
-        cmocka_unit_test(test_preset_blender), cmocka_unit_test(test_memory_without_name),
+        cmocka_unit_test(test_paths),
+        cmocka_unit_test(test_nothing_to_remove),
+        cmocka_unit_test(test_photometric),
+        cmocka_unit_test(test_sphere),
+        cmocka_unit_test(test_shadows),
+        cmocka_unit_test(test_no_such_shadow),
+        cmocka_unit_test(test_renamed_layers),
+        cmocka_unit_test(test_camera_space),
+        cmocka_unit_test(test_working_space),
+        cmocka_unit_test(test_bare),
+        cmocka_unit_test(test_preset_inline),
+        cmocka_unit_test(test_preset_blender),
+        cmocka_unit_test(test_memory_without_name),
     };
     return cmocka_run_group_tests(tests, setup, teardown);
 }

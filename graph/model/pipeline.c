@@ -215,6 +215,13 @@ static rl_code read_color(parser *q)
     return code;
 }
 
+rl_code rl_pipeline_set(rl_arena *arena, rl_value **root, const char *path, rl_value *v, rl_error *err)
+{
+    const rl_value *lights = rl_value_get(*root, "lights");
+    bool changes = !strncmp(path, "lights.", 7) && (!lights || lights->implied || lights->kind == RL_NULL);
+    return changes ? rl_value_set_over(arena, root, path, v, err) : rl_value_set(arena, root, path, v, err);
+}
+
 /* What the result depends on, as far as the pipeline says it. */
 static rl_code make_hash(parser *q)
 {

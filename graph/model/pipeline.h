@@ -74,6 +74,10 @@ typedef struct rl_pipeline {
     size_t n_outputs;
 } rl_pipeline;
 
+/* --set: rl_value_set on a pipeline's tree. Where no file lists lights, a path below `lights` is about the
+ * capture's: it makes, or changes, the `implied` map that is merged over them, and RL_NULL stays there. */
+rl_code rl_pipeline_set(rl_arena *arena, rl_value **root, const char *path, rl_value *v, rl_error *err);
+
 /* Parses a merged tree. User kernels (`pass: kernel`) become descriptors in the arena; their .cl file is read
  * here. Unknown keys, passes, parameters, ports: an error with the nearest name. Does not look at image names
  * (graph.h). */

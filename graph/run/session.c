@@ -17,8 +17,12 @@ static rl_code apply_settings(rl_session *s, rl_value **root, rl_error *err)
         if (!name)
             return rl_fail_memory(err, strlen(set->path));
         code = rl_yaml_parse(&s->arena, set->value, strlen(set->value), name, &v, err);
+        bool nothing = !code && v->kind == RL_NULL && !rl_value_at(*root, set->path);
         if (!code)
-            code = rl_value_set(&s->arena, root, set->path, v, err);
+            code = rl_pipeline_set(&s->arena, root, set->path, v, err);
+        if (!code && nothing && !s->variant && !rl_value_at(*root, set->path))
+            rl_report(s->log, RL_WARNING, RL_NOWHERE, "%s removes nothing: the pipeline has no '%s'", name,
+                      set->path);
     }
     return code;
 }

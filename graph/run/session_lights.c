@@ -148,6 +148,28 @@ static rl_code add_light(const rl_session *s, rl_sequence *q, const rl_light_spe
     return code;
 }
 
+/* `--set lights.NAME=null` is about a light that there is. */
+static rl_code check_removed(const rl_value *all, const rl_value *changes, const rl_manifest *m,
+                             rl_error *err)
+{
+    const rl_entry *e = NULL;
+    for (size_t i = 0; i < changes->n && !e; i++)
+        if (changes->entries[i].value->kind == RL_NULL && !rl_value_get(all, changes->entries[i].key))
+            e = &changes->entries[i];
+    if (!e)
+        return RL_OK;
+    rl_str text = {0};
+    const char *known[64];
+    size_t n = 0;
+    for (; all && n < all->n && n < 64; n++)
+        known[n] = all->entries[n].key;
+    rl_suggest(&text, e->key, known, n, "known");
+    rl_code code = rl_fail(err, RL_E_CONFIG, e->where, "the capture '%s' has no light '%s' to remove%s",
+                           m->name, e->key, rl_str_text(&text));
+    rl_str_free(&text);
+    return code;
+}
+
 /* The pipeline's lights, else the capture's. Paths into lights that no file of the pipeline lists
  * (`--set lights.key.exposure=1`) change the capture's. */
 static rl_code choose_lights(rl_session *s, const rl_manifest *m, rl_lights *out, rl_error *err)
@@ -156,7 +178,10 @@ static rl_code choose_lights(rl_session *s, const rl_manifest *m, rl_lights *out
     *out = m->lights;
     if (!lights)
         return RL_OK;
-    if (lights->implied && m->lights_written) {
+    rl_code code = lights->implied ? check_removed(m->lights_written, lights, m, err) : RL_OK;
+    if (code)
+        return code;
+    if (lights->implied) {
         lights = rl_value_merge(&s->arena, m->lights_written, (rl_value *)lights);
         if (!lights)
             return rl_fail_memory(err, sizeof *lights);
