@@ -32,11 +32,15 @@ static const char suffix[] = ".ledger";
 /* ---- lines -----------------------------------------------------------------------------------------------
  */
 
-/* "TIME KIND FRAME CHAIN STAT CONTENT CHECK": a line that was cut short does not check. */
+static const char kinds[] = "-bdf", broken_kinds[] = "-BDF";
+
+/* "TIME KIND FRAME CHAIN STAT CONTENT CHECK", KIND upper case for broken inputs: a line that was cut short
+ * does not check. */
 static int print_line(char *out, size_t size, int frame, const rl_ledger_line *e)
 {
     int n = snprintf(out, size, "%016" PRIx64 " %c %d %016" PRIx64 " %016" PRIx64 " %016" PRIx64, e->time,
-                     "-bdf"[e->kind], frame, e -> chain, e -> inputs.stat, e->inputs.content);
+                     (e->inputs.broken ? broken_kinds : kinds)[e->kind], frame, e->chain, e->inputs.stat,
+                     e->inputs.content);
     unsigned check = (unsigned)XXH3_64bits(out, (size_t)n);
     return n + snprintf(out + n, size - (size_t)n, " %08x\n", check);
 }
@@ -50,8 +54,9 @@ static bool parse_line(const char *line, size_t length, int *frame, rl_ledger_li
         sscanf(line, "%" SCNx64 " %c %d %" SCNx64 " %" SCNx64 " %" SCNx64 " %x", &e->time, &kind, frame,
                &e->chain, &e->inputs.stat, &e->inputs.content, &check) != 7)
         return false;
-    const char *at = strchr("-bdf", kind);
-    e->kind = at ? (rl_ledger_kind)(at - "-bdf") : RL_LEDGER_NONE;
+    e->inputs.broken = kind < 'a';
+    const char *all = e->inputs.broken ? broken_kinds : kinds, *at = strchr(all, kind);
+    e->kind = at ? (rl_ledger_kind)(at - all) : RL_LEDGER_NONE;
     return e->kind != RL_LEDGER_NONE && check == (unsigned)XXH3_64bits(line, length - 9);
 }
 

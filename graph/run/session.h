@@ -148,8 +148,11 @@ rl_code rl_session_fit_buffers(rl_sequence *sequence, rl_frame *frame, rl_error 
 typedef struct rl_loaded {
     bool skipped; /* missing, and not to be written */
     bool held;    /* the layers are of frame `source`: no past of the next one */
+    bool broken;  /* its own files are missing, or no frame can be made of them */
     size_t source;
 } rl_loaded;
+rl_code rl_session_read(rl_session *session, rl_sequence *sequence, rl_frame *frame, int file_number,
+                        rl_error *err); /* its own files alone */
 void rl_session_load(rl_session *session, rl_sequence *sequence, size_t index, rl_frame *frame,
                      rl_loaded *out);
 /* Writes all outputs of a frame that ran; files[0…n_outputs-1] (may be NULL: memory was out) get the names of

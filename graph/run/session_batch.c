@@ -28,7 +28,7 @@ static void batch_load(void *ctx, size_t item, int slot)
     f->number = b->q->frames.numbers[index];
     rl_session_stage(b->hooks, RL_LANE_READ, f);
     rl_session_load(b->s, b->q, index, f, &b->loaded[slot]);
-    rl_state_loaded(&b->state, slot, index, b->loaded[slot].source);
+    rl_state_loaded(&b->state, slot, index, &b->loaded[slot]);
     f->load_s = rl_state_now() - start;
     rl_session_span(b->hooks, b->q, f, RL_LANE_READ, "read", "decode", start);
 }
