@@ -27,7 +27,8 @@ typedef struct rl_ab_run {
     size_t n_ledgers;
     rl_ab_failure *failures;
     size_t n_failures, room_failures;
-    size_t frames; /* that were compared */
+    size_t frames;     /* that were compared */
+    bool incomparable; /* an image held NaN or infinity, or the reference has another size */
 } rl_ab_run;
 
 /* Hooks of the run, ctx is an rl_ab_run. A frame that cannot be measured is a frame that failed. */
