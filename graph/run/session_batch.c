@@ -67,7 +67,11 @@ static void batch_write(void *ctx, size_t item, int slot)
     rl_session_stage(b->hooks, RL_LANE_WRITE, f);
     if (!f->error.code && work->write && !rl_state_writing(&b->state, slot, f->number, &f->error))
         rl_session_write_frame(b->s, b->q, f, b->hooks, &arena, files, &n_files, &f->error);
+    bool saves = b->state.slots[slot].saved.history != NULL;
+    double pictures = rl_state_now();
     rl_state_written(&b->state, work, slot, f);
+    if (saves)
+        rl_session_span(b->hooks, b->q, f, RL_LANE_WRITE, "checkpoint", "checkpoint", pictures);
     f->write_s = rl_state_now() - start;
     rl_session_span(b->hooks, b->q, f, RL_LANE_WRITE, "write", "write", start);
     rl_frame_release(f);

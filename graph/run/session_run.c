@@ -183,7 +183,9 @@ rl_code rl_session_write_frame(rl_session *s, rl_sequence *q, rl_frame *f, const
             code = write_output(s, q, f, i, &frame, path, arena, err);
         if (!code)
             files[(*n_files)++] = path;
-        rl_session_span(hooks, q, f, RL_LANE_WRITE, "encode", s->outputs[i].spec->name, start);
+        const char *spec = s->outputs[i].spec->name,
+                   *whole = s->variant ? rl_arena_printf(arena, "%s/%s", s->variant, spec) : spec;
+        rl_session_span(hooks, q, f, RL_LANE_WRITE, "encode", whole ? whole : spec, start);
     }
     rl_code unmapped = memory ? rl_memory_unmap(memory, code ? NULL : err) : RL_OK;
     return code ? code : unmapped;
