@@ -165,10 +165,57 @@ static void test_signal(void **state)
     free(said);
 }
 
+/* A temporary file of process `pid` that was to become folder/name. */
+static char *leave(const char *where, const char *name, long pid)
+{
+    char *path;
+    assert_true(asprintf(&path, "%s/.%s.%ld-3.tmp", where, name, pid) > 0);
+    FILE *f = fopen(path, "w");
+    assert_true(f && fputs("half", f) >= 0 && !fclose(f));
+    return path;
+}
+
+/* What a command that was killed had begun to write is gone after the next one, and nothing else. */
+static void test_leftovers(void **state)
+{
+    (void)state;
+    pid_t dead = fork();
+    if (!dead)
+        _exit(0);
+    assert_int_equal(waitpid(dead, NULL, 0), dead);
+    char *variant = path_in(out, "taps_4"), *trace = path_in(folder, "t.json");
+    tool_result r =
+        RUN("ab", pipe_file, "--vary", "graph.sss.taps=4,21", "--out", out, "--seeds", "1", "--quiet");
+    expect(&r, 0, "");
+    tool_result_free(&r);
+    char *gone[] = {leave(out, "report.html", dead),    leave(out, "metrics.json", dead),
+                    leave(out, "junit.xml", dead),      leave(out, "sheet.png", dead),
+                    leave(variant, "s.0003.exr", dead), leave(variant, "s.0001.png", dead),
+                    leave(folder, "t.json", dead)},
+         *stay[] = {leave(out, "notes.txt", dead), leave(variant, "s.0004.exr", dead),
+                    leave(variant, "s.0002.exr", (long)getppid())};
+    r = RUN("ab", pipe_file, "--vary", "graph.sss.taps=4,21", "--out", out, "--seeds", "1", "--quiet",
+            "--sheet", "--trace", trace);
+    expect(&r, 0, "");
+    tool_result_free(&r);
+    for (size_t i = 0; i < sizeof gone / sizeof *gone; i++) {
+        if (!access(gone[i], F_OK))
+            fail_msg("%s is there", gone[i]);
+        free(gone[i]);
+    }
+    for (size_t i = 0; i < sizeof stay / sizeof *stay; i++) {
+        if (unlink(stay[i]))
+            fail_msg("%s is gone", stay[i]);
+        free(stay[i]);
+    }
+    free(trace);
+    free(variant);
+}
+
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_nan), cmocka_unit_test(test_reference),
-                                       cmocka_unit_test(test_signal)};
+                                       cmocka_unit_test(test_signal), cmocka_unit_test(test_leftovers)};
     (void)argc;
     char *self = realpath(argv[0], NULL);
     snprintf(program, sizeof program, "%s/../relit", self ? dirname(self) : "build/tests");

@@ -133,6 +133,8 @@ void rl_sequence_close(rl_sequence *sequence);
 
 /* session_paths.c: no two outputs, captures or frames write one file. */
 rl_code rl_session_paths(rl_session *session, rl_error *err);
+/* Removes what a killed process left of the files that the session writes (leftovers.h). */
+void rl_session_clean(const rl_session *session);
 
 /* session_run.c (batches of frames: session_batch.c): runs the kernels on a loaded frame, and decides whether
  * history reaches it. `spans`: NULL, or plan->n_steps of them. */

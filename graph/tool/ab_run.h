@@ -37,6 +37,9 @@ void rl_ab_run_hooks(rl_ab_run *run, rl_experiment_hooks *out);
 /* ab_ledger.c: adds the ledger of energy of each capture's last frame to run->energy. */
 rl_code rl_ab_ledger(rl_ab_run *run, rl_error *err);
 
+/* Removes what a command that was killed left of the files that rl_ab_finish writes. */
+void rl_ab_clean(rl_ab_run *run);
+
 /* Writes metrics.json, junit.xml, report.html and the sheet, and prints the summary; *over is how many
  * thresholds are exceeded. */
 rl_code rl_ab_finish(rl_ab_run *run, double seconds, size_t *over, rl_error *err);

@@ -118,7 +118,11 @@ static rl_code open_all(rl_ab_run *r, rl_error *err)
         code = rl_outdir_make(r->out, err);
     if (!code)
         code = open_sheet(r, err);
-    return code ? code : open_page(r, err);
+    if (!code)
+        code = open_page(r, err);
+    if (!code)
+        rl_ab_clean(r);
+    return code;
 }
 
 static void close_all(rl_ab_run *r)

@@ -9,6 +9,7 @@
 #include "graph/base/arena.h"
 #include "graph/base/file.h"
 #include "graph/base/text.h"
+#include "graph/run/leftovers.h"
 #include "graph/tool/ab_json.h"
 
 struct rl_trace {
@@ -130,6 +131,7 @@ static void add_span(rl_str *s, const rl_run_span *e, uint64_t zero)
 rl_code rl_trace_write(rl_trace *t, const char *path, rl_error *err)
 {
     rl_str s = {0};
+    rl_leftovers_remove(&path, 1);
     pthread_mutex_lock(&t->mutex);
     const rl_run_span **order = rl_calloc(t->n, sizeof *order);
     for (size_t i = 0; order && i < t->n; i++)
