@@ -160,6 +160,7 @@ typedef struct rl_run_summary {
     size_t frames, failed;
     size_t skipped; /* frames that a resumed run found done */
     bool lacking;   /* the shard before this one has not handed over its history yet: nothing was written */
+    bool stuck;     /* this shard could not hand over its own: all else was written */
     uint64_t nonfinite, clamped, clipped;
     size_t peak_bytes; /* the most that relit had allocated, device buffers included */
 } rl_run_summary;

@@ -12,6 +12,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include "graph/run/exr.h"
 #include "graph/run/schedule.h"
@@ -172,6 +174,35 @@ static void test_lacking(void **state)
     free(out);
 }
 
+/* A part whose history cannot be written has not done all of it: the next one would wait for ever. */
+static void test_no_hand_over(void **state)
+{
+    (void)state;
+    char *out = path_in(place.folder, "stuck"), *notes = path_in(out, ".relit"),
+         *taken = path_in(notes, "loop.0004.checkpoint"), *inside = path_in(taken, "x");
+    /* A folder has the checkpoint's name. */
+    assert_int_equal(mkdir(out, 0777) | mkdir(notes, 0777) | mkdir(taken, 0777) | mkdir(inside, 0777), 0);
+    for (int i = 0; i < 2; i++) {
+        tool_result r = BATCH(&place, "stuck", 1, "--shard", "1/3", i ? "--resume" : "--quiet");
+        assert_non_null(
+            strstr(r.err, "loop.0004.checkpoint: error: the next shard cannot go on from here: "));
+        assert_int_equal(folder_files(out), 4);
+        tool_result_free(&r);
+    }
+    assert_int_equal(rmdir(inside) | rmdir(taken), 0);
+    tool_result r = BATCH(&place, "stuck", 0, "--shard", "1/3", "--resume");
+    assert_non_null(strstr(r.err, "4 frames are there already"));
+    tool_result_free(&r);
+    assert_int_equal(batch_notes(&place, "stuck", "loop.0004.checkpoint"), 1);
+    shard("stuck", "2/3", NULL);
+    shard("stuck", "3/3", NULL);
+    batch_assert_same(&place, "plain", "stuck");
+    free(inside);
+    free(taken);
+    free(notes);
+    free(out);
+}
+
 /* Two captures and two parts: one each; no hand-over. Without history no part waits for another. */
 static void test_several(void **state)
 {
@@ -308,9 +339,10 @@ int main(int argc, char **argv)
 {
     tool_child(argc, argv);
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_parts),   cmocka_unit_test(test_schedule), cmocka_unit_test(test_equal_one_run),
-        cmocka_unit_test(test_lacking), cmocka_unit_test(test_several),  cmocka_unit_test(test_warm_up),
-        cmocka_unit_test(test_plan),
+        cmocka_unit_test(test_parts),         cmocka_unit_test(test_schedule),
+        cmocka_unit_test(test_equal_one_run), cmocka_unit_test(test_lacking),
+        cmocka_unit_test(test_no_hand_over),  cmocka_unit_test(test_several),
+        cmocka_unit_test(test_warm_up),       cmocka_unit_test(test_plan),
     };
     return cmocka_run_group_tests_name("shard", tests, setup, teardown);
 }

@@ -125,7 +125,7 @@ static rl_code run_frames(batch_state *b, bool *stopped, rl_error *err)
     rl_code code = rl_batch_run(&batch, &finished, err);
     *stopped = finished < b->state.n_work;
     if (!code)
-        rl_state_finish(&b->state, *stopped);
+        b->summary->stuck = (code = rl_state_finish(&b->state, *stopped, err)) != RL_OK;
     for (int i = 0; i < RL_MOST_IN_FLIGHT; i++)
         rl_frame_free(&b->frames[i]);
     return code;

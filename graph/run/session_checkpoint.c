@@ -246,33 +246,59 @@ static bool stored_already(const rl_sequence_state *st)
     return st->n_kept && st->kept[st->n_kept - 1] == st->last_frame;
 }
 
-void rl_state_finish(rl_sequence_state *st, bool stopped)
+/* The state after the last frame, where somebody goes on from it. */
+static rl_code store_end(rl_sequence_state *st, bool stopped, rl_error *err)
 {
-    rl_error err = {0};
     rl_checkpoint c = {0};
-    bool ran = st->history && st->n_work > 0 && !stored_already(st);
-    bool end = ran && st->last_frame == st->sequence->frames.numbers[st->last - 1];
-    if (ran && st->chained && (stopped || (end && st->hands_over)) && !take(st, &c, st->chain, &err))
-        store(st, &c, &err);
-    /* The next shard must not wait for history that a frame which failed or was held has ended. */
-    if (end && !st->chained && !stopped && st->hands_over) {
+    rl_code code = RL_OK;
+    bool end = st->last_frame == st->sequence->frames.numbers[st->last - 1],
+         hands_over = end && st->hands_over;
+    if (stored_already(st))
+        return RL_OK;
+    if (st->chained && (stopped || hands_over)) {
+        code = take(st, &c, st->chain, err);
+    } else if (!st->chained && !stopped && hands_over) {
+        /* The next shard must not wait for history that a frame which failed or was held has ended. */
         c = (rl_checkpoint){.identity = st->identity, .chain = st->chain, .frame = st->last_frame};
-        store(st, &c, &err);
+    } else {
+        return RL_OK;
     }
+    if (!code)
+        code = store(st, &c, err);
     rl_checkpoint_free(&c);
-    if (err.code)
-        rl_report(st->session->log, RL_WARNING, (rl_where){.file = err.file},
-                  "no checkpoint could be written: %s", err.text);
-    if (stopped || st->failed)
-        return;
+    return code;
+}
+
+/* All is there: nobody goes on from inside. */
+static void drop_all(rl_sequence_state *st)
+{
     int *frames;
     size_t n;
-    if (rl_checkpoint_list(&st->arena, st->folder, st->name, &frames, &n, &err))
+    rl_error ignored = {0};
+    if (rl_checkpoint_list(&st->arena, st->folder, st->name, &frames, &n, &ignored))
         return;
-    for (size_t k = 0; k < n; k++) { /* all is there: nobody goes on from inside */
+    for (size_t k = 0; k < n; k++) {
         long i = rl_frames_find(&st->sequence->frames, frames[k]);
         bool last = i + 1 == (long)st->last && st->hands_over;
         if (i >= (long)(st->first + st->warm) && i < (long)st->last && !last)
             remove_one(st, frames[k]);
     }
+}
+
+rl_code rl_state_finish(rl_sequence_state *st, bool stopped, rl_error *err)
+{
+    rl_error why = {0};
+    rl_code code = st->history && st->n_work > 0 ? store_end(st, stopped, &why) : RL_OK;
+    if (code && (stopped || !st->hands_over)) {
+        rl_report(st->session->log, RL_WARNING, (rl_where){.file = why.file},
+                  "no checkpoint could be written: %s", why.text);
+        code = RL_OK;
+    }
+    if (code)
+        return rl_fail_file(err, code, why.file,
+                            "the next shard cannot go on from here: %s (--resume hands over once more)",
+                            why.text);
+    if (!stopped && !st->failed)
+        drop_all(st);
+    return RL_OK;
 }

@@ -94,8 +94,8 @@ void rl_state_ran(rl_sequence_state *state, int slot, const rl_frame *frame, boo
 rl_code rl_state_writing(rl_sequence_state *state, int slot, int frame, rl_error *err);
 void rl_state_written(rl_sequence_state *state, const rl_work *w, int slot, const rl_frame *frame);
 /* After the last frame: a checkpoint there when somebody may go on from it, none left over when nobody will.
- */
-void rl_state_finish(rl_sequence_state *state, bool stopped);
+ * An error when the next shard waits for one that cannot be written. */
+rl_code rl_state_finish(rl_sequence_state *state, bool stopped, rl_error *err);
 
 #ifdef __cplusplus
 }

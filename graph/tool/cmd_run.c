@@ -39,7 +39,7 @@ static int status_of(rl_code code, const rl_run_summary *summary, int signal, rl
         return 128 + signal;
     }
     if (code)
-        return summary->frames || summary->lacking ? RL_EXIT_FRAME : RL_EXIT_WRONG;
+        return summary->frames || summary->lacking || summary->stuck ? RL_EXIT_FRAME : RL_EXIT_WRONG;
     return summary->failed ? RL_EXIT_FRAME : RL_EXIT_DONE;
 }
 
