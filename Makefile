@@ -3,8 +3,8 @@
 #   make demo        install what is missing, build, re-light the bundled capture
 #   make test        install what the tests miss, build, run them all
 #   make             build build/relit, build/librelit.a, build/librelit.so and the modules
-#   make test-asan   the tests under AddressSanitizer and UndefinedBehaviorSanitizer
-#   make test-leaks  the tests under LeakSanitizer
+#   make test-asan   the tests under AddressSanitizer (leaks too) and UndefinedBehaviorSanitizer
+#   make test-leaks  the tests under LeakSanitizer alone: quick, no build of its own
 #   make fuzz        changed inputs against parsers and readers, FUZZ_SECONDS=60 each
 #   make soak        2,000 frames: memory flat, nothing leaked
 #   make bench       kernels and codecs against their peers
@@ -183,7 +183,7 @@ ASAN     = BUILD=build-asan SAN="$(SANITIZE)"
 
 test-asan: deps
 	@$(MAKE) --no-print-directory -j2 $(ASAN) test-build
-	@$(ASAN) ASAN_OPTIONS=detect_leaks=0 tests/run.sh $(patsubst $(BUILD)/%,build-asan/%,$(TESTS))
+	@$(ASAN) tests/run.sh $(patsubst $(BUILD)/%,build-asan/%,$(TESTS))
 
 # All tests with LeakSanitizer, one with a browser aside: what is lost is reported at its end, and fails it.
 LEAK_TESTS = $(patsubst $(BUILD)/tests/%,$(BUILD)/leaks/%,$(filter-out %/test_page_browser,$(TESTS)))
@@ -205,7 +205,7 @@ FUZZ_SECONDS ?= 60
 FUZZ_SEED    ?= $(shell date +%s)
 fuzz: deps
 	@$(MAKE) --no-print-directory -j2 $(ASAN) build-asan/tests/fuzz/fuzz
-	@ASAN_OPTIONS=detect_leaks=0 build-asan/tests/fuzz/fuzz --seconds $(FUZZ_SECONDS) --seed $(FUZZ_SEED)
+	@build-asan/tests/fuzz/fuzz --seconds $(FUZZ_SECONDS) --seed $(FUZZ_SEED)
 
 # 2,000 frames: memory flat, no file left open. `make test` runs 120 of them.
 soak:
