@@ -14,6 +14,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/wait.h>
+#include <time.h>
 #include <unistd.h>
 
 #include "tests/small_capture.h"
@@ -212,10 +213,61 @@ static void test_leftovers(void **state)
     free(variant);
 }
 
+/* Killed at some moment, and run again: the pictures are those of a command that nothing happened to, and
+ * what is there after a kill is whole. */
+static void test_killed(void **state)
+{
+    (void)state;
+    char *plain = path_in(folder, "plain"), *killed = path_in(folder, "killed");
+    for (int i = 0; i < 8; i++) {
+        fflush(NULL);
+        pid_t pid = fork();
+        assert_true(pid >= 0);
+        if (!pid) {
+            if (freopen("/dev/null", "w", stdout) && freopen("/dev/null", "w", stderr))
+                execl(program, "relit", "ab", pipe_file, "--vary", "graph.sss.taps=21,4", "--seeds", "1",
+                      "--out", i ? killed : plain, (char *)NULL);
+            _exit(127);
+        }
+        if (i && i < 7) /* the first and the last are through */
+            nanosleep(&(struct timespec){0, 30000000 * i}, NULL);
+        if (i && i < 7)
+            kill(pid, SIGKILL);
+        int status;
+        assert_int_equal(waitpid(pid, &status, 0), pid);
+        if (i && i < 7)
+            continue;
+        assert_true(WIFEXITED(status) && WEXITSTATUS(status) == 0);
+    }
+    static const char *const variants[] = {"taps_21", "taps_4"};
+    for (int v = 0; v < 2; v++) {
+        char *a = path_in(plain, variants[v]), *b = path_in(killed, variants[v]);
+        assert_int_equal(small_check_files(b), SMALL_OUTPUTS * SMALL_FRAMES); /* whole, nothing temporary */
+        for (int f = 1; f <= SMALL_FRAMES; f++) {
+            char name[32];
+            size_t n[2];
+            snprintf(name, sizeof name, "s.%04d.exr", f);
+            char *x = path_in(a, name), *y = path_in(b, name), *p = file_read(x, &n[0]),
+                 *q = file_read(y, &n[1]);
+            assert_true(n[0] == n[1] && !memcmp(p, q, n[0]));
+            free(x);
+            free(y);
+            free(p);
+            free(q);
+        }
+        free(a);
+        free(b);
+    }
+    assert_int_equal(folder_files(killed), folder_files(plain));
+    free(plain);
+    free(killed);
+}
+
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_nan), cmocka_unit_test(test_reference),
-                                       cmocka_unit_test(test_signal), cmocka_unit_test(test_leftovers)};
+                                       cmocka_unit_test(test_signal), cmocka_unit_test(test_leftovers),
+                                       cmocka_unit_test(test_killed)};
     (void)argc;
     char *self = realpath(argv[0], NULL);
     snprintf(program, sizeof program, "%s/../relit", self ? dirname(self) : "build/tests");

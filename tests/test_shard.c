@@ -9,10 +9,13 @@
 #include <jansson.h>
 #include <limits.h>
 #include <math.h>
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
+#include <time.h>
 #include <unistd.h>
 
 #include "graph/run/exr.h"
@@ -203,6 +206,42 @@ static void test_no_hand_over(void **state)
     free(out);
 }
 
+/* Each part is killed or stopped at some moment, and started again, until all are through. */
+static void test_killed(void **state)
+{
+    (void)state;
+    static const char *const parts[] = {"1/3", "2/3", "3/3"};
+    static const int signals[] = {SIGKILL, SIGTERM, SIGKILL, SIGINT};
+    uint32_t random = 20261122;
+    int kills = 0;
+    for (int i = 0, tries = 0; i < 3; tries++) {
+        pid_t pid = batch_start(&place, "killed",
+                                (const char *const[]){"--quiet", "--resume", "--shard", parts[i],
+                                                      "--checkpoint-frames", "1", NULL});
+        random = random * 1664525u + 1013904223u;
+        if (tries < 6)
+            nanosleep(&(struct timespec){0, (long)(random >> 8) % 200 * 1000000}, NULL);
+        else
+            tries = 0; /* whatever the machine's speed: let one go through */
+        int status = 0, number = signals[random >> 16 & 3];
+        if (tries)
+            kill(pid, number);
+        assert_int_equal(waitpid(pid, &status, 0), pid);
+        bool through = WIFEXITED(status) && WEXITSTATUS(status) == 0;
+        bool stopped = (WIFSIGNALED(status) && WTERMSIG(status) == number) ||
+                       (WIFEXITED(status) && WEXITSTATUS(status) == 128 + number);
+        assert_true(through || stopped);
+        kills += stopped;
+        i += through;
+    }
+    assert_true(kills > 2);
+    batch_assert_same(&place, "plain", "killed");
+    assert_int_equal(batch_notes(&place, "killed", ".tmp"), 0);
+    tool_result r = BATCH(&place, "killed", 0, "--resume", "--json"); /* nothing is left to be done */
+    assert_string_equal(r.out, "");
+    tool_result_free(&r);
+}
+
 /* Two captures and two parts: one each; no hand-over. Without history no part waits for another. */
 static void test_several(void **state)
 {
@@ -341,8 +380,9 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_parts),         cmocka_unit_test(test_schedule),
         cmocka_unit_test(test_equal_one_run), cmocka_unit_test(test_lacking),
-        cmocka_unit_test(test_no_hand_over),  cmocka_unit_test(test_several),
-        cmocka_unit_test(test_warm_up),       cmocka_unit_test(test_plan),
+        cmocka_unit_test(test_no_hand_over),  cmocka_unit_test(test_killed),
+        cmocka_unit_test(test_several),       cmocka_unit_test(test_warm_up),
+        cmocka_unit_test(test_plan),
     };
     return cmocka_run_group_tests_name("shard", tests, setup, teardown);
 }

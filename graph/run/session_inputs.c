@@ -34,24 +34,24 @@ bool rl_state_is_usable(rl_sequence_state *st, size_t i)
 {
     if (st->usable[i] != RL_USABLE_UNKNOWN)
         return st->usable[i] == RL_USABLE;
-    rl_inputs in = rl_state_own_inputs(st, i);
+    const rl_inputs in = st->inputs[i] = rl_state_own_inputs(st, i);
     const rl_inputs *last = &rl_ledger_find(st->ledger, st->sequence->frames.numbers[i])->inputs;
     bool broke = !in.missing && last->broken && last->content == in.content;
     st->usable[i] = in.missing || (broke && !can_be_read(st, i)) ? RL_NOT_USABLE : RL_USABLE;
     return st->usable[i] == RL_USABLE;
 }
 
-rl_inputs rl_state_expected_inputs(rl_sequence_state *st, size_t i)
+bool rl_state_is_missing(rl_sequence_state *st, size_t i)
 {
-    rl_inputs in = rl_state_own_inputs(st, i);
-    if (st->session->options.on_missing != RL_MISSING_HOLD || rl_state_is_usable(st, i))
-        return in;
-    for (size_t k = i; k-- > 0;) {
-        if (!rl_state_is_usable(st, k))
-            continue;
-        rl_inputs source = rl_state_own_inputs(st, k);
-        in.content = rl_state_held_content(&in, &source);
-        break;
-    }
-    return in;
+    return !rl_state_is_usable(st, i) && st->inputs[i].missing;
+}
+
+uint64_t rl_state_expected_content(rl_sequence_state *st, size_t i)
+{
+    if (rl_state_is_usable(st, i) || st->session->options.on_missing != RL_MISSING_HOLD)
+        return st->inputs[i].content;
+    for (size_t k = i; k-- > 0;)
+        if (rl_state_is_usable(st, k))
+            return rl_state_held_content(&st->inputs[i], &st->inputs[k]);
+    return st->inputs[i].content;
 }

@@ -26,7 +26,7 @@ static uint64_t extend(uint64_t chain, int frame, uint64_t content)
  * that is still waited for: its shard says by a checkpoint without history that it has not come. */
 static bool ends_history(rl_sequence_state *st, size_t i)
 {
-    bool waited_for = i + 1 == st->first && rl_state_own_inputs(st, i).missing &&
+    bool waited_for = i + 1 == st->first && rl_state_is_missing(st, i) &&
                       rl_ledger_find(st->ledger, st->sequence->frames.numbers[i])->kind == RL_LEDGER_NONE;
     return !waited_for && !rl_state_is_usable(st, i);
 }
@@ -40,7 +40,7 @@ static void expect_chains(rl_sequence_state *st, size_t begin, size_t from, size
     for (size_t i = from; i < to; i++) {
         st->cut[i] |= !rl_state_is_usable(st, i) || (i > begin && ends_history(st, i - 1));
         chain = extend(st->cut[i] ? st->root : chain, st->sequence->frames.numbers[i],
-                       rl_state_expected_inputs(st, i).content);
+                       rl_state_expected_content(st, i));
         chains[i] = chain;
     }
 }
@@ -73,7 +73,7 @@ static void find_done(rl_sequence_state *st, const uint64_t *chains, bool *neede
         const rl_ledger_line *line = rl_ledger_find(st->ledger, frame);
         bool there = line->kind == RL_LEDGER_DONE && pictures_exist(st, frame);
         bool skips = st->session->options.on_missing == RL_MISSING_SKIP;
-        if (skips && rl_state_own_inputs(st, i).missing)
+        if (skips && rl_state_is_missing(st, i))
             needed[i] = false;
         else
             needed[i] = !there || line->chain != chains[i];
@@ -236,8 +236,9 @@ rl_code rl_sequence_state_begin(rl_sequence_state *st, rl_session *s, size_t seq
     st->name = rl_ledger_name(&st->arena, q->manifest->name);
     st->cut = rl_arena_array(&st->arena, q->frames.n + 1, sizeof *st->cut);
     st->usable = rl_arena_array(&st->arena, q->frames.n + 1, sizeof *st->usable);
+    st->inputs = rl_arena_array(&st->arena, q->frames.n + 1, sizeof *st->inputs);
     st->kept = rl_arena_array(&st->arena, q->frames.n + 1, sizeof *st->kept);
-    if (!st->folder || !st->name || !st->cut || !st->usable || !st->kept)
+    if (!st->folder || !st->name || !st->cut || !st->usable || !st->inputs || !st->kept)
         return rl_fail_memory(err, q->frames.n * sizeof *st->kept);
     find_range(st, sequence);
     if (s->options.shard[1])

@@ -41,7 +41,8 @@ typedef struct rl_sequence_state {
     size_t first, last; /* indices of the sequence's frames: this run's, warm-up included */
     size_t warm;        /* so many of them are warm-up */
     bool *cut;          /* [frames.n]: no history reaches it, for all that is known before it runs */
-    rl_usable *usable;  /* [frames.n]: whether its own files can be used (session_inputs.h) */
+    rl_usable *usable;  /* [frames.n]: whether its own files can be used (session_inputs.h), and */
+    rl_inputs *inputs;  /* [frames.n], where that is known: what they were when the run began */
     rl_ledger *ledger;
     rl_work *work;
     size_t n_work, n_write; /* frames to be run; of them to be written */
