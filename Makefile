@@ -157,7 +157,7 @@ $(addprefix $(BUILD)/tests/test_ab_,against json junit measure null words): $(BU
 $(BUILD)/tests/test_faults $(BUILD)/leaks/test_faults: $(BUILD)/tests/count_cl.o
 
 # They load the module; so does whatever writes PNG files.
-$(addprefix $(BUILD)/tests/test_,image_file sg_run diff ab_against ab_sheet ab_status ab page_browser): | $(BUILD)/relit_oiio.so
+$(addprefix $(BUILD)/tests/test_,image_file sg_run diff errors experiment faults ab_against ab_energy ab_sheet ab_status ab page_browser): | $(BUILD)/relit_oiio.so
 
 # The same objects with LeakSanitizer in front of malloc: quick, and no build of its own.
 $(BUILD)/leaks/relit: $(MAIN_O) $(BUILD)/tests/sanitizers.o $(BUILD)/tool.a $(BUILD)/librelit.a | $(BUILD)/relit_oiio.so

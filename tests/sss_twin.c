@@ -5,6 +5,7 @@
 
 #include "passes/burley.h"
 #include "tests/sss_patterns.h"
+#include "tests/twin_hash.h"
 
 static const double pi = 3.14159265358979323846;
 
@@ -267,16 +268,6 @@ static float group_of(const twin_scene *s, int x, int y, float slopes[2])
     }
 }
 
-static uint32_t hash(uint32_t a, uint32_t b, uint32_t c, uint32_t d)
-{
-    uint32_t h = a * 0x9E3779B1u ^ b * 0x85EBCA77u ^ c * 0xC2B2AE3Du ^ d * 0x27D4EB2Fu;
-    h ^= h >> 15;
-    h *= 0x2C1B3C6Du;
-    h ^= h >> 12;
-    h *= 0x297A2D39u;
-    return h ^ (h >> 15);
-}
-
 static double fraction(double x)
 {
     return x - floor(x);
@@ -287,10 +278,12 @@ static void choice_of(const twin_scene *s, int x, int y, int seed, double choice
 {
     static const int order[4][4] = {{2, 3, 12, 6}, {14, 8, 4, 10}, {1, 11, 0, 5}, {15, 7, 13, 9}};
     int number = s->frame.number, px = x & 3, py = y & 3;
-    double shift[2] = {ldexp(hash((uint32_t)seed, 0, 0, 1), -32), ldexp(hash((uint32_t)seed, 0, 0, 2), -32)};
+    double shift[2] = {ldexp(twin_hash((uint32_t)seed, 0, 0, 1), -32),
+                       ldexp(twin_hash((uint32_t)seed, 0, 0, 2), -32)};
     for (int i = 0; i < 2; i++) {
         if (s->rotation == TWIN_WHITE) {
-            uint32_t h = hash((uint32_t)seed, (uint32_t)number, (uint32_t)(4 * py + px), (uint32_t)i + 1);
+            uint32_t h =
+                twin_hash((uint32_t)seed, (uint32_t)number, (uint32_t)(4 * py + px), (uint32_t)i + 1);
             choice[i] = ldexp(h, -32);
         } else if (s->rotation == TWIN_IGN) {
             double u = (i ? py : px) + 5.588238 * number, v = (i ? px : py) + 5.588238 * number;

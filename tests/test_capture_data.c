@@ -15,19 +15,6 @@
 #include "tests/capture_sequence.h"
 #include "tests/tool_run.h"
 
-static int setup(void **state)
-{
-    (void)state;
-    return capture_start() ? 0 : -1;
-}
-
-static int teardown(void **state)
-{
-    (void)state;
-    capture_stop();
-    return 0;
-}
-
 /* ---- sizes ---- */
 
 static void test_sizes_in_a_sequence(void **state)
@@ -191,5 +178,5 @@ int main(void)
         cmocka_unit_test(test_sizes_in_a_frame),    cmocka_unit_test(test_counts),
         cmocka_unit_test(test_ids_refused),
     };
-    return cmocka_run_group_tests(tests, setup, teardown);
+    return cmocka_run_group_tests(tests, capture_setup, capture_teardown);
 }

@@ -19,7 +19,6 @@
 #include "tests/tool_run.h"
 
 static char capture[PATH_MAX]; /* captures/monkey */
-static char program[PATH_MAX]; /* relit itself, beside the tests */
 
 static const char pipeline[] =
     "relit: 1\n"
@@ -150,6 +149,7 @@ static void test_usage(void **state)
         {{"run", "p", "--shard", "0/3"}, "I from 1 to N"},
         {{"run", "p", "--shard", "4/3"}, "I from 1 to N"},
         {{"run", "p", "--shard", "3"}, "I from 1 to N"},
+        {{"run", "p", "--shard", "1/1000001"}, "I from 1 to N"},
         {{"run", "p", "--preroll", "4"}, "give --shard I/N too"},
         {{"ab"}, "needs a PIPELINE, see"},
         {{"ab", "p", "--sheet="}, "option '--sheet' takes [=FILE], found ''"},
@@ -158,6 +158,7 @@ static void test_usage(void **state)
         {{"run", "p", "--pairs"}, "it is for ab"},
         {{"bench", "--size", "1920"}, "WxH in pixels"},
         {{"bench", "--size", "0x10"}, "WxH in pixels"},
+        {{"bench", "--size", "10x65537"}, "WxH in pixels"},
         {{"inspect", "p", "--resume"}, "it is for run, check, plan"},
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
@@ -297,7 +298,7 @@ static interrupted interrupt(int number, int again, const char *pipe, const char
         dup2(errors[1], 2);
         close(results[0]);
         close(errors[0]);
-        execl(program, "relit", "run", pipe, "--out", out, "--json", "--quiet", (char *)NULL);
+        execl(tool_program(), "relit", "run", pipe, "--out", out, "--json", "--quiet", (char *)NULL);
         _exit(127);
     }
     close(results[1]);
@@ -688,29 +689,19 @@ static void test_program(void **state)
 {
     (void)state;
     const char *version[] = {"--version", NULL}, *wrong[] = {"rum", NULL};
-    tool_result r = tool_spawn(program, NULL, version);
+    tool_result r = tool_spawn(tool_program(), NULL, version);
     expect(&r, 0);
     assert_string_equal(r.out, "relit " RL_VERSION "\n");
     tool_result_free(&r);
-    r = tool_spawn(program, NULL, wrong);
+    r = tool_spawn(tool_program(), NULL, wrong);
     expect(&r, 2);
     assert_string_equal(r.out, "");
     tool_result_free(&r);
 }
 
-static void find_program(void)
-{
-    ssize_t n = readlink("/proc/self/exe", program, sizeof program - 16);
-    program[n > 0 ? n : 0] = 0;
-    for (int i = 0; i < 2 && strrchr(program, '/'); i++) /* BUILD/tests/test_tool -> BUILD */
-        *strrchr(program, '/') = 0;
-    strcat(program, "/relit");
-}
-
 int main(int argc, char **argv)
 {
     tool_child(argc, argv);
-    find_program();
     if (!realpath("captures/monkey", capture)) {
         fprintf(stderr, "run this from the repository: captures/monkey is not here\n");
         return 1;

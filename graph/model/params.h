@@ -48,6 +48,9 @@ void rl_param_print(const rl_param *row, const void *value, rl_str *s);
  * "0 … 1 ratio, no default" for .no_default rows. */
 void rl_param_describe(const rl_param *row, rl_str *s);
 
+/* What may be given for a number, for an error that names the row: "auto or an integer 0 … 64 (taps)". */
+void rl_param_expected(const rl_param *row, rl_str *s);
+
 /* A row as a field of an OpenCL struct, "float blend;" or, with the prefix "profile_", "float
  * profile_weight[3];"; a list as its fields. */
 void rl_param_field(const rl_param *row, const char *prefix, rl_str *s);

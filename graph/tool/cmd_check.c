@@ -1,9 +1,8 @@
 /* `relit check`: all that can be known without a pixel. Besides what opening a session checks, it opens every
  * frame's files, so that a hole in a sequence is found before the night's run. */
-#include <jansson.h>
-#include <stdlib.h>
 
 #include "graph/run/session.h"
+#include "graph/tool/json_print.h"
 #include "graph/tool/outdir.h"
 #include "graph/tool/tool.h"
 
@@ -38,15 +37,9 @@ static void print_json(const rl_tool *tool, const rl_session *s, rl_str *out)
         json_array_append_new(
             captures, json_pack("{s:s, s:o}", "name", rl_session_capture_name(s, i), "frames", frames));
     }
-    json_t *object =
-        json_pack("{s:s, s:b, s:o}", "pipeline", tool->args.run.pipeline, "ok", 1, "captures", captures);
-    char *text = object ? json_dumps(object, JSON_COMPACT) : NULL;
-    if (text)
-        rl_str_printf(out, "%s\n", text);
-    else
-        out->failed = true;
-    free(text);
-    json_decref(object);
+    rl_json_print(
+        json_pack("{s:s, s:b, s:o}", "pipeline", tool->args.run.pipeline, "ok", 1, "captures", captures),
+        JSON_COMPACT, out);
 }
 
 /* Headers of every frame: files, parts, channels, sizes, cameras. Each bad frame is reported; returns how

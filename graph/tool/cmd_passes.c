@@ -1,10 +1,9 @@
 /* `relit passes`: the passes of this build, printed from their tables. */
-#include <jansson.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "graph/model/graph.h"
 #include "graph/model/params.h"
+#include "graph/tool/json_print.h"
 #include "graph/tool/markdown.h"
 #include "graph/tool/tool.h"
 
@@ -216,13 +215,7 @@ static void print_json(const rl_pass *pass, rl_str *out)
     json_t *json = pass ? pass_json(pass) : json_array();
     for (size_t i = 0; !pass && i < rl_pass_count(); i++)
         json_array_append_new(json, pass_json(rl_pass_at(i)));
-    char *text = json_dumps(json, JSON_INDENT(1) | JSON_REAL_PRECISION(9));
-    if (text)
-        rl_str_printf(out, "%s\n", text);
-    else
-        out->failed = true;
-    free(text);
-    json_decref(json);
+    rl_json_print(json, JSON_INDENT(1) | JSON_REAL_PRECISION(9), out);
 }
 
 static rl_code unknown(const rl_tool *tool, rl_error *err)
