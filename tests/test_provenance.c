@@ -148,6 +148,9 @@ static void test_places(void **state)
     file_write(b, "p.yaml", said, strlen(said));
     expect_changed(first, open_in(b, &none), false, false, "another folder");
     expect_changed(first, open_in(a, &other), true, false, "--set");
+    setenv("RELIT_KERNELS", "kernels", 1); /* files in the place of those that the version stands for */
+    expect_changed(first, open_in(a, &none), true, false, "$RELIT_KERNELS");
+    unsetenv("RELIT_KERNELS");
     char *plain = path_in(b, "other.ocio"), *text = text_replace(colors, "name: v", "name: u");
     file_write(b, "other.ocio", text, strlen(text));
     expect_changed(first, open_in(b, &(rl_options){.ocio = plain}), true, false, "--ocio");

@@ -5,6 +5,7 @@
 
 #include "graph/base/file.h"
 #include "graph/run/file_hash.h"
+#include "graph/run/kernel_source.h"
 #include "graph/run/session.h"
 
 static uint64_t add_text(uint64_t hash, const char *text)
@@ -67,6 +68,7 @@ static rl_code add_lamps(const rl_value *lights, uint64_t *hash, rl_error *err)
 static rl_code hash_pipeline(const rl_session *s, uint64_t *out, rl_error *err)
 {
     uint64_t h = add_number(add_number(0, s->pipeline->hash), s->colors);
+    h = add_number(h, rl_kernel_files_hash());
     rl_code code = add_lamps(s->pipeline->lights, &h, err);
     if (!code)
         code = add_named(s->pipeline->ambient, "hdri", &h, err);
