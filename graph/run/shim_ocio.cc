@@ -2,6 +2,7 @@
 
 #include <OpenColorIO/OpenColorIO.h>
 
+#include <algorithm>
 #include <cstring>
 #include <exception>
 #include <new>
@@ -178,7 +179,9 @@ static void add_files(const OCIO::Config &config, const OCIO::ConstTransformRcPt
             add_files(config, group->getTransform(i), out);
     if (auto file = OCIO::DynamicPtrCast<const OCIO::FileTransform>(transform)) {
         try {
-            out.push_back(config.getCurrentContext()->resolveFileLocation(file->getSrc()));
+            std::string path = config.getCurrentContext()->resolveFileLocation(file->getSrc());
+            if (std::find(out.begin(), out.end(), path) == out.end())
+                out.push_back(path);
         } catch (const OCIO::Exception &) { /* not there: whoever uses the transform will hear of it */
         }
     }

@@ -49,7 +49,8 @@ typedef struct rl_ocio_names {
 rl_code rl_ocio_list_names(const rl_ocio *ocio, rl_ocio_list what, const char *of, rl_arena *arena,
                            rl_ocio_names *out, rl_error *err);
 
-/* Paths of the files that its transforms read, in a fixed order; without those that are not there. */
+/* Paths of the files that its transforms read, each once, in a fixed order; without those that are not there.
+ */
 rl_code rl_ocio_files(const rl_ocio *ocio, rl_arena *arena, rl_ocio_names *out, rl_error *err);
 
 /* The colour space that a name, alias or role stands for; NULL when there is none. Lives as long as the
