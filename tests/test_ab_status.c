@@ -166,6 +166,34 @@ static void test_signal(void **state)
     free(said);
 }
 
+/* All is compared when the signal comes, and the report is being written: it is finished. */
+static void test_late_signal(void **state)
+{
+    (void)state;
+    char *late = path_in(folder, "late"), *metrics = path_in(late, "metrics.json"),
+         *report = path_in(late, "report.html");
+    int status;
+    fflush(NULL);
+    pid_t pid = fork();
+    assert_true(pid >= 0);
+    if (!pid) {
+        if (freopen("/dev/null", "w", stdout) && freopen("/dev/null", "w", stderr))
+            execl(program, "relit", "ab", pipe_file, "--vary", "graph.sss.taps=21,4", "--seeds", "1", "--out",
+                  late, (char *)NULL);
+        _exit(127);
+    }
+    while (access(metrics, F_OK) && !waitpid(pid, &status, WNOHANG)) /* the page comes behind it */
+        ;
+    kill(pid, SIGTERM);
+    assert_int_equal(waitpid(pid, &status, 0), pid);
+    assert_true(WIFEXITED(status) && WEXITSTATUS(status) == 0);
+    assert_int_equal(access(report, F_OK), 0);
+    assert_int_equal(folder_files(late), 2 * SMALL_OUTPUTS * SMALL_FRAMES + 3); /* nothing temporary */
+    free(report);
+    free(metrics);
+    free(late);
+}
+
 /* A temporary file of process `pid` that was to become folder/name. */
 static char *leave(const char *where, const char *name, long pid)
 {
@@ -265,9 +293,9 @@ static void test_killed(void **state)
 
 int main(int argc, char **argv)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_nan), cmocka_unit_test(test_reference),
-                                       cmocka_unit_test(test_signal), cmocka_unit_test(test_leftovers),
-                                       cmocka_unit_test(test_killed)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_nan),       cmocka_unit_test(test_reference),
+                                       cmocka_unit_test(test_signal),    cmocka_unit_test(test_late_signal),
+                                       cmocka_unit_test(test_leftovers), cmocka_unit_test(test_killed)};
     (void)argc;
     char *self = realpath(argv[0], NULL);
     snprintf(program, sizeof program, "%s/../relit", self ? dirname(self) : "build/tests");

@@ -200,14 +200,14 @@ static int run_all(rl_ab_run *r, rl_error *err)
     e.run = rl_experiment_run(r->experiment, &hooks, &e.summary, err);
     if (!e.run && r->frames && !r->tool->args.run.energy)
         e.ledger = add_ledger(r);
-    e.signal = rl_signals_caught();
-    rl_signals_end();
+    e.signal = rl_signals_caught(); /* one that comes from here on finds all done but the writing */
     if (!e.run || e.summary.frames || e.run == RL_E_CANCELLED) /* not: kernels that do not compile */
         rl_report_run_end(report, &e.summary, e.run == RL_E_CANCELLED);
     if (!e.run || r->frames)
         e.finish = rl_ab_finish(r, now_s() - begin, &e.over, &unwritten);
     if (!e.finish && r->trace)
         e.finish = rl_trace_write(r->trace, r->tool->args.trace, &unwritten);
+    rl_signals_end();
     if (e.finish)
         rl_report_error(report, &unwritten);
     return status_of(r, &e, err);
