@@ -231,12 +231,22 @@ rl_code rl_params_read(rl_arena *arena, const rl_pass *pass, const char *node, c
     return RL_OK;
 }
 
-bool rl_step_runs(const rl_pass *pass, const rl_step *step, const void *params)
+static bool is_when(const rl_pass *pass, const void *params, const char *when, int32_t is)
 {
-    const rl_param *row = step->when ? find_row(pass->params, step->when) : NULL;
+    const rl_param *row = when ? find_row(pass->params, when) : NULL;
     int32_t v;
     if (!row)
         return true;
     memcpy(&v, (const char *)params + row->offset, sizeof v);
-    return v == step->is;
+    return v == is;
+}
+
+bool rl_step_runs(const rl_pass *pass, const rl_step *step, const void *params)
+{
+    return is_when(pass, params, step->when, step->is);
+}
+
+bool rl_port_exists(const rl_pass *pass, const rl_port *port, const void *params)
+{
+    return is_when(pass, params, port->when, port->is);
 }

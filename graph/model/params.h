@@ -39,8 +39,10 @@ const void *rl_param_element(const rl_param *row, const void *value, size_t i, s
 /* Whether a value of an RL_ENUM row is one of the words "a|b". */
 bool rl_param_is(const rl_param *row, const void *value, const char *words);
 
-/* Whether a step of the pass runs with these parameters (the pass's struct; may be NULL when it has none). */
+/* Whether a step of the pass runs, and whether there is memory for a SCRATCH port, with these parameters (the
+ * pass's struct; may be NULL when it has none): their .when and .is. */
 bool rl_step_runs(const rl_pass *pass, const rl_step *step, const void *params);
+bool rl_port_exists(const rl_pass *pass, const rl_port *port, const void *params);
 
 /* A value as YAML text ("auto", "screen", "0.05", "[1, 0, 0]"), appended to s. */
 void rl_param_print(const rl_param *row, const void *value, rl_str *s);

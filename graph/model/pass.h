@@ -186,9 +186,12 @@ typedef struct rl_port {
                        with a profile and that word makes the port required (graph.h); NULL = none does */
     const char *without; /* SCRATCH: an optional port; there is memory only where nothing feeds that */
     const char *with;    /* SCRATCH: the REDUCTION port that it exists for; NULL = always */
-    const char *of;      /* HISTORY: the port (own output first, else own input) whose past this is */
-    rl_layout layout;    /* the layout that the kernel wants; the plan inserts the conversion */
-    bool any_layout;     /* WRITE: the kernel stores through RL_STORE, so the plan may choose (LAYOUT_NAME) */
+    const char
+        *when; /* SCRATCH: a structural parameter; there is memory only where it is .is; NULL = always */
+    int32_t is;
+    const char *of;   /* HISTORY: the port (own output first, else own input) whose past this is */
+    rl_layout layout; /* the layout that the kernel wants; the plan inserts the conversion */
+    bool any_layout;  /* WRITE: the kernel stores through RL_STORE, so the plan may choose (LAYOUT_NAME) */
 } rl_port;
 
 /* Whether a port makes an image of the graph. */
