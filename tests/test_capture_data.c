@@ -124,12 +124,19 @@ static void test_counts(void **state)
         char *folder = sequence_make(&f, s, 2);
         for (int i = 0; i < 5; i++)
             assert_int_equal(s[0].id[i], 0);
-        sequence_run(folder, capture_pipeline, (rl_options){0}, &o);
+        capture_log_clear();
+        sequence_run(folder, capture_pipeline, (rl_options){.log = &capture_logger}, &o);
         assert_int_equal(o.summary.failed, 0);
         assert_int_equal(o.nonfinite[1], 5);
         assert_int_equal(o.clamped[1], 3);
         assert_int_equal(o.summary.nonfinite, 10);
         assert_int_equal(o.summary.clamped, 6);
+        /* which layer it was, once */
+        const char *said = strstr(capture_log(), "layer 'albedo': 3 NaN or infinite samples in frame 1");
+        assert_non_null(said);
+        assert_null(strstr(said + 1, "layer 'albedo'"));
+        assert_non_null(strstr(capture_log(), "layer 'normal': 1 NaN or infinite sample in frame 1"));
+        assert_non_null(strstr(capture_log(), "layer 'depth': 1 NaN or infinite sample in frame 1"));
         sequence_leave(folder, s, 2);
     }
 }

@@ -35,7 +35,8 @@ static void test_texts(void **state)
         const rl_pass *p = rl_pass_at(i);
         assert_non_null(p->name);
         check_help(p->name, "pass", p->help);
-        assert_true(p->source && strlen(p->source) > 3);
+        if (!p->source || strlen(p->source) <= 3)
+            fail_msg("%s: no .source: which paper or program it is from", p->name);
         assert_true(strspn(p->name, "abcdefghijklmnopqrstuvwxyz0123456789_") == strlen(p->name));
         assert_ptr_equal(rl_pass_find(p->name), p); /* so names differ, too */
         assert_string_not_equal(p->name, "kernel"); /* stands for a user's own */
@@ -121,7 +122,8 @@ static void test_params(void **state)
                              bytes); /* in order, without gaps: as OpenCL lays it out */
             bytes += RL_PARAM_BYTES(p->params.rows[k].type);
         }
-        assert_int_equal(p->params_size, bytes);
+        if (p->params_size != bytes)
+            fail_msg("%s: .params_size is %zu, but its rows take %zu bytes", p->name, p->params_size, bytes);
         check_unique(p->name, p->params);
         const rl_params groups[] = {p->profile_keys, p->material_keys, p->shading_keys};
         for (int g = 0; g < 3; g++) {
@@ -187,10 +189,40 @@ static bool has_reduction(const rl_pass *p, const char *name)
     return false;
 }
 
+static bool has_word(const char *words, const char *word, size_t length)
+{
+    for (; words; words = strchr(words, '|') ? strchr(words, '|') + 1 : NULL)
+        if (strcspn(words, "|") == length && !strncmp(words, word, length))
+            return true;
+    return false;
+}
+
+/* "KEY: a|b" is of a profile key and of words that it has; the port instead of it is one that is read. */
+static void check_missed(const rl_pass *p, const rl_port *port)
+{
+    bool key = false, instead = !port->instead;
+    size_t n = strcspn(port->missed_by, ":");
+    assert_true(port->role == RL_READ && port->optional);
+    check_help(p->name, port->name, port->if_missed);
+    for (size_t i = 0; i < p->ports.n && port->instead; i++)
+        instead |= p->ports.rows[i].role == RL_READ && !strcmp(p->ports.rows[i].name, port->instead);
+    for (size_t i = 0; i < p->profile_keys.n; i++) {
+        const rl_param *row = &p->profile_keys.rows[i];
+        if (strncmp(row->name, port->missed_by, n) || row->name[n])
+            continue;
+        key = true;
+        for (const char *w = port->missed_by + n + 2; w; w = strchr(w, '|') ? strchr(w, '|') + 1 : NULL)
+            assert_true(has_word(row->words, w, strcspn(w, "|")));
+    }
+    assert_true(key && instead);
+}
+
 static void check_port(const rl_pass *p, size_t which)
 {
     const rl_port *a = &p->ports.rows[which];
     check_help(p->name, a->name, a->help);
+    if (a->missed_by)
+        check_missed(p, a);
     assert_true(strspn(a->name, "abcdefghijklmnopqrstuvwxyz0123456789_") == strlen(a->name));
     assert_true((a->of != NULL) == (a->role == RL_HISTORY));
     if (a->of) {

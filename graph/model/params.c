@@ -103,6 +103,9 @@ static bool fits(const rl_param *row, const rl_value *v)
 static rl_code read_int(const rl_param *row, const rl_value *v, void *out, rl_error *err)
 {
     int word = v->kind == RL_TEXT && row->words ? find_word(row->words, v->text) : -1;
+    if (v->kind == RL_NUMBER && fabs(v->number) > INT32_MAX &&
+        row->max >= INT32_MAX) /* a limit worth a word */
+        return rl_value_wrong(v, row->name, "an integer of at most 2147483647 (32 bits)", err);
     if (word < 0 && (!fits(row, v) || v->number != floor(v->number) || fabs(v->number) > INT32_MAX))
         return wrong(row, v, err);
     store_int(out, word >= 0 ? -1.0 - word : v->number);
@@ -160,6 +163,8 @@ rl_code rl_param_read(const rl_param *row, const rl_value *v, void *out, rl_erro
         break;
     case RL_ROWS:
         code = rl_list_read(row, v, out, err);
+        if (!code)
+            code = rl_list_check_sums(row, v, out, err);
         break;
     case RL_MATERIALS:
         memset(out, 0, rl_param_bytes(row)); /* rl_material_sets_fill, when the capture is known */
@@ -190,8 +195,11 @@ static rl_code unknown_key(rl_arena *arena, const rl_pass *pass, const char *nod
     for (size_t i = 0; i < n; i++)
         names[i] = pass->params.rows[i].name;
     char *text = rl_arena_printf(arena, "pass '%s' (%s) has no parameter '%s'", node, pass->name, entry->key);
-    /* A slip in `in` or `pass` gets its hint too, but only parameters are listed. */
+    /* A slip in `in` or `pass` gets its hint too, but only parameters are listed. Not so `taps`, which is two
+     * letters away from `pass`: more likely it is another pass's. */
     const char *other = rl_nearest(entry->key, names, n) ? NULL : rl_nearest(entry->key, also, n_also);
+    if (other && entry->key[0] != other[0])
+        other = NULL;
     if (text && other)
         text = rl_arena_printf(arena, "%s; did you mean '%s'?", text, other);
     else if (text && !n)

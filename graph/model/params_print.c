@@ -37,14 +37,15 @@ void rl_param_expected(const rl_param *row, rl_str *s)
 {
     if (row->type == RL_I32 && row->words)
         rl_str_printf(s, "%s or ", row->words);
+    rl_str range = {0};
+    add_range(row, &range);
     rl_str_add(s, row->type == RL_I32    ? "an integer"
-                  : row->type == RL_RGBF ? "a number or a list of three, each"
+                  : row->type == RL_RGBF ? "a number or a list of three"
                                          : "a number");
-    size_t before = s->length;
-    rl_str_add(s, " ");
-    add_range(row, s);
-    if (s->length == before + 1 && s->text)
-        s->text[s->length = before] = 0;
+    if (range.length)
+        rl_str_printf(s, "%s %s", row->type == RL_RGBF ? ", each" : "", rl_str_text(&range));
+    s->failed |= range.failed;
+    rl_str_free(&range);
     if (row->unit && row->unit[0])
         rl_str_printf(s, " (%s)", row->unit);
 }

@@ -181,6 +181,10 @@ typedef struct rl_port {
     bool optional;         /* READ: may be absent; the kernel sees NULL and HAS_NAME 0 */
     const char *if_absent; /* optional READ: what the pass does without it, said once in the log; NULL = not
                               worth a word */
+    const char *missed_by; /* optional READ: "transmission: thin|thick", a profile key of this pass and words
+                              of it; where a material's profile has one of them, and neither this port nor */
+    const char *instead;   /* this other one (or NULL) has an image, the log says */
+    const char *if_missed; /* what comes of it */
     const char
         *needed_by; /* optional READ: "diffuse: sg" is a shading key of this pass and a word of it; a material
                        with a profile and that word makes the port required (graph.h); NULL = none does */

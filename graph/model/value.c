@@ -257,7 +257,6 @@ typedef struct setting {
     rl_arena *arena;
     const char *path; /* the whole */
     rl_value *v;
-    bool keeps; /* a removal stays as a null, for the tree that this one is merged over */
     rl_error *err;
 } setting;
 
@@ -284,10 +283,9 @@ static rl_code set_in_map(const setting *s, rl_value *map, const char *rest, siz
 {
     rl_entry *e = (rl_entry *)find_n(map, rest, length);
     bool last = !rest[length];
-    bool removes = s->v->kind == RL_NULL && !s->keeps;
-    if (removes && !e)
+    if (s->v->kind == RL_NULL && !e)
         return RL_OK;
-    if (removes && last) {
+    if (s->v->kind == RL_NULL && last) {
         remove_entry(map, e);
         return RL_OK;
     }
@@ -325,11 +323,8 @@ static rl_code set_at(const setting *s, rl_value **at, const char *rest)
     return code;
 }
 
-static rl_code set_path(setting *s, rl_value **root)
+rl_code rl_value_set(rl_arena *arena, rl_value **root, const char *path, rl_value *v, rl_error *err)
 {
-    const char *path = s->path;
-    const rl_value *v = s->v;
-    rl_error *err = s->err;
     enum { DEEPEST = 32 }; /* far beyond any schema; keeps recursion over trees bounded */
     int depth = 1;
     for (const char *p = path; *p; p++)
@@ -339,17 +334,6 @@ static rl_code set_path(setting *s, rl_value **root)
         return rl_fail(err, RL_E_USAGE, v->where, "'%s' is no dotted path, such as graph.sss.taps", path);
     if (depth > DEEPEST)
         return rl_fail(err, RL_E_USAGE, v->where, "the path has %d parts; the most is %d", depth, DEEPEST);
-    return set_at(s, root, path);
-}
-
-rl_code rl_value_set(rl_arena *arena, rl_value **root, const char *path, rl_value *v, rl_error *err)
-{
     setting s = {.arena = arena, .path = path, .v = v, .err = err};
-    return set_path(&s, root);
-}
-
-rl_code rl_value_set_over(rl_arena *arena, rl_value **root, const char *path, rl_value *v, rl_error *err)
-{
-    setting s = {.arena = arena, .path = path, .v = v, .keeps = true, .err = err};
-    return set_path(&s, root);
+    return set_at(&s, root, path);
 }

@@ -77,9 +77,6 @@ rl_value *rl_value_merge(rl_arena *arena, rl_value *base, rl_value *over);
 /* --set: puts v at a dotted path of *root, creating maps on the way; RL_NULL removes. List elements can be
  * replaced by index, not added. `where` names the option in errors. */
 rl_code rl_value_set(rl_arena *arena, rl_value **root, const char *path, rl_value *v, rl_error *err);
-/* The same in a part that will be merged over something else: RL_NULL is put there, and removes what it then
- * lies over. */
-rl_code rl_value_set_over(rl_arena *arena, rl_value **root, const char *path, rl_value *v, rl_error *err);
 
 /* ---- checked reading of maps, for every parser of a config (value.c) ---- */
 

@@ -37,18 +37,19 @@ static void convert_normal(const rl_reader *r, const rl_frame *f, const rl_layer
                            rl_rows rows)
 {
     float m[9];
-    for (int i = 0; i < 9; i++) { /* a capture that looks down +z has its own z turned around */
-        float v = f->camera.to_world[4 * (i / 3) + i % 3];
-        m[i] = i % 3 == 2 && r->setup.manifest->camera.forward_z ? -v : v;
-    }
+    bool forward_z = r->setup.manifest->camera.forward_z;
     rl_ingest_normal how = {.encoding = layer->encoding,
-                            .rotate = layer->space == RL_SPACE_CAMERA ? m : NULL};
+                            .rotate = rl_ingest_normal_matrix(layer, &f->camera, forward_z, m)};
     rl_ingest_normal_rows(p, rows, &how);
 }
 
 static void convert_stencil(const rl_reader *r, rl_frame *f, rl_frame_maps *maps, uint32_t *p, rl_rows rows)
 {
     rl_unknown_ids unknown = {0};
+    const rl_layer *layer = r->bindings[r->stencil].layer;
+    for (int y = rows.y0; y < rows.y1 && !layer->n_channels; y++)
+        for (int x = 0; x < rows.width; x++)
+            p[(size_t)y * rows.stride + (size_t)x] = layer->constant;
     for (int y = rows.y0; y < rows.y1 && f->ids; y++)
         memcpy(f->ids + (size_t)y * (size_t)rows.width, p + (size_t)y * rows.stride,
                (size_t)rows.width * sizeof *p);
@@ -128,14 +129,17 @@ rl_code rl_reader_check_ids(const rl_reader *r, const rl_frame *f, const rl_fram
     if (!u->pixels)
         return RL_OK;
     rl_str text = {0};
-    for (size_t i = 0; i < u->n; i++)
-        rl_str_printf(&text, "%s%u (%llu pixels)", i ? ", " : "", u->ids[i].id,
-                      (unsigned long long)u->ids[i].pixels);
+    for (size_t i = 0; i < u->n; i++) {
+        const char *name = rl_manifest_stencil_name(r->setup.manifest, u->ids[i].id);
+        rl_str_printf(&text, "%s%u%s%s%s (%llu pixel%s)", i ? ", " : "", u->ids[i].id, name ? " '" : "",
+                      name ? name : "", name ? "'" : "", (unsigned long long)u->ids[i].pixels,
+                      u->ids[i].pixels == 1 ? "" : "s");
+    }
     rl_code code =
         rl_fail_file(err, RL_E_DATA, f->files[f->main_file] ? rl_exr_path(f->files[f->main_file]) : "memory",
                      "frame %d: no material covers stencil id %s; add a material with 'stencil:', or "
-                     "'default: {}' for the rest (known: %zu materials)",
-                     f->number, rl_str_text(&text), r->setup.materials->count - 1);
+                     "'default: {}' for the rest",
+                     f->number, rl_str_text(&text));
     rl_str_free(&text);
     return code;
 }

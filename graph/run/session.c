@@ -2,6 +2,7 @@
 #include "graph/run/session.h"
 
 #include <string.h>
+#include <strings.h>
 #include <unistd.h>
 
 #include "graph/base/alloc.h"
@@ -17,12 +18,8 @@ static rl_code apply_settings(rl_session *s, rl_value **root, rl_error *err)
         if (!name)
             return rl_fail_memory(err, strlen(set->path));
         code = rl_yaml_parse(&s->arena, set->value, strlen(set->value), name, &v, err);
-        bool nothing = !code && v->kind == RL_NULL && !rl_value_at(*root, set->path);
         if (!code)
-            code = rl_pipeline_set(&s->arena, root, set->path, v, err);
-        if (!code && nothing && !s->variant && !rl_value_at(*root, set->path))
-            rl_report(s->log, RL_WARNING, RL_NOWHERE, "%s removes nothing: the pipeline has no '%s'", name,
-                      set->path);
+            code = rl_pipeline_set(&s->arena, root, set->path, v, s->log, err);
     }
     return code;
 }
@@ -34,6 +31,11 @@ static rl_code read_pipeline(rl_session *s, rl_error *err)
     rl_code code;
     if (o->pipeline_text)
         code = rl_yaml_parse(&s->arena, o->pipeline_text, strlen(o->pipeline_text), "pipeline", &root, err);
+    else if (o->pipeline &&
+             (rl_path_is_folder(o->pipeline) || !strcasecmp(rl_path_extension(o->pipeline), ".exr")))
+        code = rl_fail_file(err, RL_E_CONFIG, o->pipeline,
+                            "this is a capture, not a pipeline: `relit init %s` writes a pipeline for it",
+                            o->pipeline);
     else if (o->pipeline)
         code = rl_config_load(&s->arena, o->pipeline, &root, err);
     else

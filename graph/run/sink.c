@@ -15,6 +15,9 @@
 static const char *const kept_attributes[] = {"camera:*",
                                               "worldToCamera",
                                               "worldToNDC",
+                                              "cameraTransform",
+                                              "cameraFov",
+                                              "unreal/*",
                                               "timeCode",
                                               "framesPerSecond",
                                               "capDate",
@@ -96,7 +99,7 @@ static rl_code make_coverage(const rl_sink_frame *f, const region *r, rl_pool *p
     return RL_OK;
 }
 
-/* Channel letters of DESIGN 3: R G B (A), X Y Z, V, ID. */
+/* Channel letters of DESIGN 3: R G B (A), X Y Z, V, ID. A plane a light has the light's name. */
 static const char *const *letters(rl_format format, int *n)
 {
     static const char *const rgb[] = {"R", "G", "B"}, *const xyz[] = {"X", "Y", "Z"}, *const v[] = {"V"},
@@ -152,7 +155,9 @@ static void add_image(channel_list *list, const rl_sink_image *image, rl_exr_pix
     const char *const *names = letters(image->format, &n);
     size_t at = (size_t)r->y0 * image->stride + (size_t)r->x0;
     for (int i = 0; i < image->planes; i++) {
-        const char *letter = i < n ? names[i] : rl_arena_printf(&list->arena, "V%d", i);
+        const char *letter = image->lights ? image->lights[i]
+                             : i < n       ? names[i]
+                                           : rl_arena_printf(&list->arena, "V%d", i);
         rl_exr_source s = {
             .stride = image->stride, .type = type, .floats = image->pixels + (size_t)i * image->plane + at};
         if (image->format == RL_ID) {

@@ -5,6 +5,7 @@
 #include <strings.h>
 
 #include "graph/model/pass.h"
+#include "graph/run/camera_header.h"
 #include "graph/run/data_files.h"
 #include "graph/run/shim_ocio.h"
 #include "graph/tool/capture.h"
@@ -212,6 +213,27 @@ static bool is_name(const char *text)
     return text[0] && strchr(letters, text[0]) && !text[strspn(text, all)] && strcmp(text, "default");
 }
 
+/* The ids of the i-th name and of those behind it that are called the same: "6", "[6, 7]". */
+static void add_ids(rl_str *out, const rl_manifest *m, size_t i)
+{
+    rl_str ids = {0};
+    size_t n = 0;
+    for (size_t k = i; k < m->n_stencil_names; k++)
+        if (k == i || !strcmp(m->stencil_names[k].name, m->stencil_names[i].name))
+            rl_str_printf(&ids, "%s%lld", n++ ? ", " : "", (long long)m->stencil_names[k].id);
+    rl_str_printf(out, n > 1 ? "[%s]" : "%s", rl_str_text(&ids));
+    out->failed |= ids.failed;
+    rl_str_free(&ids);
+}
+
+static bool named_before(const rl_manifest *m, size_t i)
+{
+    for (size_t k = 0; k < i; k++)
+        if (!strcmp(m->stencil_names[k].name, m->stencil_names[i].name))
+            return true;
+    return false;
+}
+
 /* `ids`: those of the first frame, for a capture that names none. */
 static void add_materials(rl_str *out, const rl_manifest *m, const uint32_t *ids, size_t n_ids)
 {
@@ -222,14 +244,25 @@ static void add_materials(rl_str *out, const rl_manifest *m, const uint32_t *ids
         const char *name = m->stencil_names[i].name;
         long long id = (long long)m->stencil_names[i].id;
         const guess *g = guess_for(name);
+        if (named_before(m, i))
+            continue;
         rl_str_add(out, "  ");
         if (is_name(name))
             add_text(out, name);
         else
             rl_str_printf(out, "id-%lld", id);
-        rl_str_printf(out, ": {stencil: %lld}", id);
-        if (g)
-            rl_str_printf(out, "    # {stencil: %lld, profile: %s}", id, g->profile);
+        rl_str_add(out, ": {stencil: ");
+        add_ids(out, m, i);
+        rl_str_add(out, "}");
+        if (g) {
+            rl_str_add(out, "    # {stencil: ");
+            add_ids(out, m, i);
+            rl_str_printf(out, ", profile: %s}", g->profile);
+        }
+        if (!is_name(name)) {
+            rl_str_add(out, g ? ", " : "    # ");
+            add_text(out, name);
+        }
         rl_str_add(out, "\n");
     }
     for (size_t i = 0; i < n_ids; i++)
@@ -291,6 +324,29 @@ static void add_graph(rl_str *out, const rl_manifest *m, const char *display, co
     rl_str_add(out, "}\n");
 }
 
+/* A bare file whose header does not say where the camera is: no pipeline would run on it. */
+static rl_code says_no_camera(rl_arena *arena, const rl_capture *capture, rl_error *err)
+{
+    double matrix[16];
+    rl_exr *file = NULL;
+    const rl_manifest *m = capture->manifest;
+    if (capture->file || m->camera.matrix_source != RL_SOURCE_HEADER)
+        return RL_OK;
+    char *path = rl_capture_first(arena, m, 0);
+    rl_code code = path ? rl_exr_open(path, 0, &file, err) : rl_fail_memory(err, 1);
+    bool found = false;
+    for (int p = 0; !code && p < rl_exr_parts(file); p++)
+        found = found || rl_camera_header_matrix(file, p, m->camera.forward_z, matrix);
+    if (!code && !found)
+        code = rl_fail_file(
+            err, RL_E_CONFIG, path,
+            "the file does not say where its camera is; `relit inspect %s` prints a capture.yaml to "
+            "begin with: save it, write camera.matrix and camera.fov_x there, and name it here",
+            path);
+    rl_exr_close(&file);
+    return code;
+}
+
 int rl_cmd_init(rl_tool *tool, rl_error *err)
 {
     const char *path = tool->args.operand, *display = NULL, *view = NULL;
@@ -301,10 +357,13 @@ int rl_cmd_init(rl_tool *tool, rl_error *err)
     rl_str text = {0};
     if (rl_capture_find(tool->arena, path, &tool->report->log, &capture, err))
         return RL_EXIT_WRONG;
+    if (!capture.missing && says_no_camera(tool->arena, &capture, err))
+        return RL_EXIT_WRONG;
     if (capture.missing) {
         rl_fail_file(
             err, RL_E_CONFIG, path,
-            "no preset finds all that relit needs (%s missing); write a capture.yaml, see `relit inspect %s`",
+            "no preset finds all that relit needs (%s missing); `relit inspect %s` prints a capture.yaml to "
+            "begin with: save it, complete it, and name it here",
             capture.missing, path);
         return RL_EXIT_WRONG;
     }

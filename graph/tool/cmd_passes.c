@@ -210,11 +210,21 @@ static json_t *pass_json(const rl_pass *pass)
                      rows_json(pass->material_keys), "shading_keys", rows_json(pass->shading_keys));
 }
 
-static void print_json(const rl_pass *pass, rl_str *out)
+/* Without a table, and in the shape of those that have one. */
+static json_t *kernel_json(void)
 {
-    json_t *json = pass ? pass_json(pass) : json_array();
-    for (size_t i = 0; !pass && i < rl_pass_count(); i++)
+    return json_pack("{s:s, s:s, s:[], s:[], s:[], s:[], s:[], s:s}", "name", kernel_name, "help",
+                     kernel_help, "ports", "parameters", "profile_keys", "material_keys", "shading_keys",
+                     "keys", kernel_keys + strlen("\nkeys\n"));
+}
+
+static void print_json(const rl_pass *pass, bool kernel, rl_str *out)
+{
+    json_t *json = kernel ? kernel_json() : pass ? pass_json(pass) : json_array();
+    for (size_t i = 0; !pass && !kernel && i < rl_pass_count(); i++)
         json_array_append_new(json, pass_json(rl_pass_at(i)));
+    if (!pass && !kernel)
+        json_array_append_new(json, kernel_json());
     rl_json_print(json, JSON_INDENT(1) | JSON_REAL_PRECISION(9), out);
 }
 
@@ -257,10 +267,10 @@ int rl_cmd_passes(rl_tool *tool, rl_error *err)
         rl_fail_file(err, RL_E_USAGE, "relit passes", "--json and --markdown exclude each other");
         return RL_EXIT_WRONG;
     }
-    if (kernel)
+    if (tool->args.json)
+        print_json(pass, kernel, &text);
+    else if (kernel)
         print_kernel(markdown, &text);
-    else if (tool->args.json)
-        print_json(pass, &text);
     else if (markdown && pass)
         rl_markdown_pass(pass, &text);
     else if (markdown)
