@@ -124,7 +124,8 @@ static void report_camera(rl_reader *r, const rl_frame *f, int file_number, cons
     }
 }
 
-/* The file whose header knows the camera: that of the depth, or where that knows nothing, the first that does. */
+/* The file whose header knows the camera: that of the depth, or where that knows nothing, the first that
+ * does. */
 static const rl_exr *camera_file(const rl_reader *r, const rl_frame *f, int *part)
 {
     const bool forward_z = r->setup.manifest->camera.forward_z;
@@ -154,8 +155,7 @@ static rl_code read_camera(rl_reader *r, rl_frame *f, int file_number, rl_error 
     rl_camera_lens lens;
     rl_error inner = {0};
     bool has_jitter;
-    rl_code code =
-        rl_camera_read(r->setup.manifest, file_number, file, part, &c, &lens, &has_jitter, &inner);
+    rl_code code = rl_camera_read(r->setup.manifest, file_number, file, part, &c, &lens, &has_jitter, &inner);
     if (!code) {
         report_camera(r, f, file_number, &lens, has_jitter);
         code = rl_camera_make(&c, &f->camera, &inner);
