@@ -145,10 +145,10 @@ static rl_code write_output(rl_session *s, rl_sequence *q, rl_frame *f, size_t o
     if (!code)
         code = rl_sink_write(path, &s->outputs[output], wr.images, w->n_layers, frame, s->pool, &f->clipped,
                              err);
-    for (size_t i = 0; i < w->n_layers; i++) {
-        rl_code unmapped = wr.memory[i] ? rl_memory_unmap(wr.memory[i], code ? NULL : err) : RL_OK;
-        code = code ? code : unmapped;
-    }
+    for (size_t i = 0; i < w->n_layers; i++)
+        if (wr.memory[i]) /* what was read has been read: a device that fails now is told of at its next call
+                           */
+            (void)rl_memory_unmap(wr.memory[i], NULL);
     return code;
 }
 
@@ -189,8 +189,9 @@ rl_code rl_session_write_frame(rl_session *s, rl_sequence *q, rl_frame *f, const
                    *whole = s->variant ? rl_arena_printf(arena, "%s/%s", s->variant, spec) : spec;
         rl_session_span(hooks, q, f, RL_LANE_WRITE, "encode", whole ? whole : spec, start);
     }
-    rl_code unmapped = memory ? rl_memory_unmap(memory, code ? NULL : err) : RL_OK;
-    return code ? code : unmapped;
+    if (memory)
+        (void)rl_memory_unmap(memory, NULL);
+    return code;
 }
 
 /* ---- one frame -------------------------------------------------------------------------------------------
