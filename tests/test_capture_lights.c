@@ -92,6 +92,7 @@ static void test_paths(void **state)
         {{{"lights.rim", "null"}}, 1, SCENE_LIGHTS & ~SCENE_RIM},
         {{{"lights.key.intensity", "null"}, {"lights.key.candela", "[2049, 1366, 683]"}}, 2, SCENE_LIGHTS},
         {{{"lights.key.efficacy", "100"}, {"lights.rim", "null"}}, 2, SCENE_LIGHTS & ~SCENE_RIM},
+        {{{"lights.rim.exposure", "1"}, {"lights.rim", "null"}}, 2, SCENE_LIGHTS & ~SCENE_RIM},
         {{{"lights.rim.efficacy", "null"}}, 1, SCENE_LIGHTS},
         {{{"lights", "{}"}}, 1, 0}};
     static const char *const color[] = {"c.color"};

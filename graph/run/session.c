@@ -78,6 +78,8 @@ rl_code rl_session_open_variant(const rl_options *options, const char *variant, 
     if (!code)
         code = rl_session_sequences(s, err);
     if (!code)
+        code = rl_session_content(s, err);
+    if (!code)
         code = rl_session_paths(s, err);
     if (!code)
         code = rl_session_count(s, err);

@@ -1,4 +1,5 @@
 /* A frame through a session: its kernels, its files, and one at a time. */
+#include <inttypes.h>
 #include <limits.h>
 #include <math.h>
 #include <string.h>
@@ -156,8 +157,9 @@ static rl_code write_output(rl_session *s, rl_sequence *q, rl_frame *f, size_t o
 rl_code rl_session_write_frame(rl_session *s, rl_sequence *q, rl_frame *f, const rl_run_hooks *hooks,
                                rl_arena *arena, const char **files, size_t *n_files, rl_error *err)
 {
-    const char *pipeline = rl_arena_printf(arena, "%s %016llx", s->pipeline->name, s->pipeline->hash);
-    if (!pipeline || !files)
+    const char *pipeline = rl_arena_printf(arena, "%s %016" PRIx64, s->pipeline->name, s->content);
+    const char *capture = rl_arena_printf(arena, "%s %016" PRIx64, q->manifest->name, q->content);
+    if (!pipeline || !capture || !files)
         return rl_fail_memory(err, s->n_outputs * sizeof *files);
     rl_sink_image stencil = {0};
     rl_memory *memory = NULL;
@@ -171,7 +173,8 @@ rl_code rl_session_write_frame(rl_session *s, rl_sequence *q, rl_frame *f, const
                            .source = f->files[f->main_file],
                            .source_part = f->main_part,
                            .fps = q->manifest->fps,
-                           .pipeline = pipeline};
+                           .pipeline = pipeline,
+                           .capture = capture};
     for (size_t i = 0; i < s->n_outputs && !code; i++) {
         const char *name = NULL;
         double start = rl_state_now();
@@ -184,7 +187,9 @@ rl_code rl_session_write_frame(rl_session *s, rl_sequence *q, rl_frame *f, const
             code = write_output(s, q, f, i, &frame, path, arena, err);
         if (!code)
             files[(*n_files)++] = path;
-        rl_session_span(hooks, q, f, RL_LANE_WRITE, "encode", s->outputs[i].spec->name, start);
+        const char *spec = s->outputs[i].spec->name,
+                   *whole = s->variant ? rl_arena_printf(arena, "%s/%s", s->variant, spec) : spec;
+        rl_session_span(hooks, q, f, RL_LANE_WRITE, "encode", whole ? whole : spec, start);
     }
     if (memory)
         (void)rl_memory_unmap(memory, NULL);
