@@ -9,6 +9,18 @@ static inline floatv tap(global const float *p, constant frame_t *f, int x, int 
     return rl_load_edge(p, f, x, y);
 }
 
+/* The same; `inside`: the vector and its neighbours to the left and right lie in the image's columns. A constant, so that
+ * no load asks again: that keeps what surrounds the loads in one piece. */
+static inline floatv tap_near(global const float *p, constant frame_t *f, int x, int y, const int inside)
+{
+    return inside ? rl_load(p, rl_index(f, x, clamp(y, f->valid[1], f->valid[3] - 1))) : tap(p, f, x, y);
+}
+
+static inline int columns_inside(constant frame_t *f, int x)
+{
+    return x > f->valid[0] && x + RL_W < f->valid[2];
+}
+
 static inline floatv far_if_empty(floatv z)
 {
     return rl_select(FAR, z, z > 0.0f);
@@ -40,7 +52,7 @@ typedef struct box_t {
 /* Mean and deviation of the 3x3 neighbourhood (Salvi 2016), around the pixel's own colour, which keeps the variance from
  * cancelling. The box is grown to contain that colour: a detail as small as a pixel would else be clipped away. */
 static inline void colour_box(box_t *b, constant frame_t *f, global const float *color, const floatv *own, int x, int y,
-                              floatv gamma)
+                              floatv gamma, const int inside)
 {
     floatv sum[3] = {0.0f, 0.0f, 0.0f}, squares[3] = {0.0f, 0.0f, 0.0f}, brightest = 0.0f, own_y[3];
     to_ycocg(own, own_y);
@@ -51,7 +63,7 @@ static inline void colour_box(box_t *b, constant frame_t *f, global const float 
         floatv d[3], v[3];
         RL_UNROLL
         for (int c = 0; c < 3; c++)
-            d[c] = tap(color + c * f->plane, f, x + i % 3 - 1, y + i / 3 - 1) - own[c];
+            d[c] = tap_near(color + c * f->plane, f, x + i % 3 - 1, y + i / 3 - 1, inside) - own[c];
         to_ycocg(d, v);
         brightest = fmax(brightest, v[0] + own_y[0]);
         RL_UNROLL
