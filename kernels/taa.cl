@@ -32,8 +32,8 @@ static inline floatv snap(floatv d)
 /* The displacement of the pixel's own surface or, where another is in front of it in 3x3, of the closest (Karis 2014), so
  * that an edge moves as one. On one and the same surface a neighbour's displacement would be wrong by a little in the same
  * direction in every frame. */
-static inline void find_place(constant frame_t *f, global const float *depth, global const float *motion,
-                              global const uint *stencil, int x, int y, uintv id, place_t *p, const int inside)
+COPIED void find_place(constant frame_t *f, global const float *depth, global const float *motion,
+                       global const uint *stencil, int x, int y, uintv id, place_t *p, const int inside)
 {
     float m[12];
     int moved = camera_change(f, m);

@@ -11,7 +11,9 @@ static inline floatv tap(global const float *p, constant frame_t *f, int x, int 
 
 /* The same; `inside`: the vector and its neighbours to the left and right lie in the image's columns. A constant, so that
  * no load asks again: that keeps what surrounds the loads in one piece. */
-static inline floatv tap_near(global const float *p, constant frame_t *f, int x, int y, const int inside)
+#define COPIED static inline __attribute__((always_inline)) /* a copy for each value of a constant argument */
+
+COPIED floatv tap_near(global const float *p, constant frame_t *f, int x, int y, const int inside)
 {
     return inside ? rl_load(p, rl_index(f, x, clamp(y, f->valid[1], f->valid[3] - 1))) : tap(p, f, x, y);
 }
@@ -51,7 +53,7 @@ typedef struct box_t {
 
 /* Mean and deviation of the 3x3 neighbourhood (Salvi 2016), around the pixel's own colour, which keeps the variance from
  * cancelling. The box is grown to contain that colour: a detail as small as a pixel would else be clipped away. */
-static inline void colour_box(box_t *b, constant frame_t *f, global const float *color, const floatv *own, int x, int y,
+COPIED void colour_box(box_t *b, constant frame_t *f, global const float *color, const floatv *own, int x, int y,
                               floatv gamma, const int inside)
 {
     floatv sum[3] = {0.0f, 0.0f, 0.0f}, squares[3] = {0.0f, 0.0f, 0.0f}, brightest = 0.0f, own_y[3];
