@@ -104,8 +104,8 @@ typedef struct rl_exr_plane {
 } rl_exr_plane;
 
 /* Called on the thread that has just unpacked rows y0…y1-1 (relative to the data window) of all planes, so
- * that they can be converted while they are in the cache. Calls run in parallel and in any order; each row
- * comes once. */
+ * that they can be converted while they are in the cache: of scanlines one row at a time, of tiles a row of
+ * them. Calls run in parallel and in any order; each row comes once. */
 typedef struct rl_exr_rows {
     void (*done)(void *ctx, int part, int y0, int y1);
     void *ctx;
