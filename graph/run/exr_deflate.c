@@ -34,12 +34,29 @@ static size_t sample_bytes(rl_exr_pixel type)
     return type == RL_EXR_HALF ? 2 : 4;
 }
 
+static void pack_mask(const uint32_t *ids, rl_exr_pixel type, size_t width, uint8_t *out)
+{
+    const uint16_t one = 0x3c00;
+    for (size_t x = 0; type == RL_EXR_HALF && x < width; x++) {
+        uint16_t half = ids[x] ? one : 0;
+        memcpy(out + 2 * x, &half, sizeof half);
+    }
+    for (size_t x = 0; type == RL_EXR_FLOAT && x < width; x++) {
+        float f = ids[x] ? 1.0f : 0.0f;
+        memcpy(out + 4 * x, &f, sizeof f);
+    }
+}
+
 /* Row `y` (relative to the data window) of a channel as the file has it; returns how many values were
  * clamped. */
 static size_t pack_row(const rl_exr_deflater *de, const rl_exr_source *source, int y, size_t width,
                        uint8_t *out)
 {
     size_t from = (size_t)y * source->stride;
+    if (source->type != RL_EXR_UINT && !source->floats) {
+        pack_mask(source->ids + from, source->type, width, out);
+        return 0;
+    }
     if (source->type == RL_EXR_HALF)
         return de->kernels->float_to_half(source->floats + from, out, width);
     memcpy(out, source->type == RL_EXR_UINT ? (const void *)(source->ids + from) : (source->floats + from),
