@@ -121,17 +121,19 @@ static inline floatv firefly_weight(const box_t *b, const floatv *rgb)
 static inline int camera_change(constant frame_t *f, float *m)
 {
     constant camera_t *a = &f->camera, *b = &f->previous;
-    int same = a->focal[0] == b->focal[0] && a->focal[1] == b->focal[1] && a->centre[0] == b->centre[0] &&
-               a->centre[1] == b->centre[1];
-    for (int i = 0; i < 12; i++)
-        same = same && a->to_view[i] == b->to_view[i];
+    int4 other = (vload4(0, a->focal) != vload4(0, b->focal)) | /* and the centres behind */
+                 (vload4(0, a->to_view) != vload4(0, b->to_view)) |
+                 (vload4(1, a->to_view) != vload4(1, b->to_view)) |
+                 (vload4(2, a->to_view) != vload4(2, b->to_view));
+    if (!(other.x | other.y | other.z | other.w))
+        return 0;
     for (int i = 0; i < 3; i++) {
         constant float *row = &b->to_view[4 * i];
         for (int j = 0; j < 3; j++)
             m[3 * i + j] = row[0] * a->to_world[j] + row[1] * a->to_world[4 + j] + row[2] * a->to_world[8 + j];
         m[9 + i] = row[0] * a->to_world[3] + row[1] * a->to_world[7] + row[2] * a->to_world[11] + row[3];
     }
-    return !same;
+    return 1;
 }
 
 /* Displacement of what is seen at (x, y) at depth z, by the cameras alone; `closer` is previous depth / z. */
