@@ -26,10 +26,10 @@ static uint32_t random_word(void)
     return word;
 }
 
-/* Ids whose bytes, behind ZIP's predictor, begin with 16 that come again 32 later and have no other like them:
- * coding the second time depends on how the first byte of all was remembered. ISA-L 2.30 remembers it by 13
- * bits, made of bits of an address when it is not kept from it (see exr_deflate.c), and by the right ones with
- * one address in 8192. */
+/* Ids whose bytes, behind ZIP's predictor, begin with 16 that come again 32 later and have no other like
+ * them: coding the second time depends on how the first byte of all was remembered. ISA-L 2.30 remembers it
+ * by 13 bits, made of bits of an address when it is not kept from it (see exr_deflate.c), and by the right
+ * ones with one address in 8192. */
 static void fill(uint32_t *ids)
 {
     for (int i = 0; i < 2 * WIDTH; i++)

@@ -10,8 +10,8 @@
  * rows and planes then evicts itself. Such strides get two cache lines more. */
 #define ALIASING_STRIDE 512
 #define STRIDE_PAD      32
-/* As do neighbours in RL_PHASE4: the sub-rows and planes that a filter's taps read at a time. An odd number of
- * cache lines from one sub-row to the next puts them into all sets. */
+/* As do neighbours in RL_PHASE4: the sub-rows and planes that a filter's taps read at a time. An odd number
+ * of cache lines from one sub-row to the next puts them into all sets. */
 #define LINE 16
 /* Kernels index the planes of an rgb image with an int; rl_plan_fits looks at images with more planes. */
 #define PLANES_AT_LEAST 3

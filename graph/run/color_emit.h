@@ -14,8 +14,8 @@ typedef struct rl_color_text {
     bool no_memory;
 } rl_color_text;
 
-/* The vector functions that bodies call, in front of every program, and behind them those that read tables. Pieces of
- * text, NULL behind the last. */
+/* The vector functions that bodies call, in front of every program, and behind them those that read tables.
+ * Pieces of text, NULL behind the last. */
 extern const char *const rl_color_prelude[], *const rl_color_tables[];
 
 /* In front of them, in programs without tables: makes floatv two vectors where that is faster, and defines

@@ -1,8 +1,9 @@
 #include "graph/run/color_emit.h"
 
-/* A colour program is one long chain, each operation waiting for the one before: with a vector's worth of pixels a CPU
- * waits two thirds of its time. So CPUs get two vectors as one, in the vectors of any length that clang has, which become
- * an instruction for each half in turn. The names are those of common.cl, so that programs need not know. */
+/* A colour program is one long chain, each operation waiting for the one before: with a vector's worth of
+ * pixels a CPU waits two thirds of its time. So CPUs get two vectors as one, in the vectors of any length
+ * that clang has, which become an instruction for each half in turn. The names are those of common.cl, so
+ * that programs need not know. */
 const char *const rl_color_wide =
     "#if RL_W == 16 && defined(__clang__) && (defined(__x86_64__) || defined(__aarch64__))\n"
     "#define COLOR_VECTORS 2\n"

@@ -167,8 +167,8 @@ void rl_exr_attr_print(const rl_exr *file, int part, size_t i, rl_str *out);
 
 /* ---- writing ---- */
 
-/* A channel to be written. `floats` for half and float, `ids` for uint; half and float with `ids` alone is a mask:
- * 1 where the id is not 0. */
+/* A channel to be written. `floats` for half and float, `ids` for uint; half and float with `ids` alone is a
+ * mask: 1 where the id is not 0. */
 typedef struct rl_exr_source {
     const char *name; /* with its layer: "diffuse.R" */
     rl_exr_pixel type;

@@ -3,6 +3,7 @@
 #include "graph/run/exr_core.h"
 
 #include <math.h>
+#include <pthread.h>
 #include <string.h>
 
 #if defined(__x86_64__)
@@ -10,7 +11,6 @@
 #include <immintrin.h>
 #define RL_X86 1
 #define VECTOR __attribute__((target("avx2,f16c,popcnt")))
-#define WIDEST __attribute__((target("avx512f,avx512bw,avx2,f16c,popcnt")))
 #endif
 
 #define HALF_MAX      65504.0f
@@ -231,44 +231,6 @@ VECTOR static void span_decode_avx2(const uint8_t *even, const uint8_t *odd, siz
     span_decode_c(even + i, odd + i, n - i, carry, out + 2 * i);
 }
 
-/* The same for 64 bytes; lanes are of 16. */
-WIDEST static inline __m512i running_sum_512(__m512i v, __m512i *carry)
-{
-    v = _mm512_xor_si512(v, _mm512_set1_epi8((char)128));
-    v = _mm512_add_epi8(v, _mm512_bslli_epi128(v, 1));
-    v = _mm512_add_epi8(v, _mm512_bslli_epi128(v, 2));
-    v = _mm512_add_epi8(v, _mm512_bslli_epi128(v, 4));
-    v = _mm512_add_epi8(v, _mm512_bslli_epi128(v, 8));
-    __m512i last = _mm512_shuffle_epi8(v, _mm512_set1_epi8(15));
-    __m512i one = _mm512_maskz_shuffle_i64x2(0xfc, last, last, 0x90);  /* 0 a b c */
-    __m512i two = _mm512_maskz_shuffle_i64x2(0xf0, last, last, 0x40);  /* 0 0 a b */
-    __m512i three = _mm512_maskz_shuffle_i64x2(0xc0, last, last, 0x00); /* 0 0 0 a */
-    __m512i before = _mm512_add_epi8(one, _mm512_add_epi8(two, three));
-    __m512i total = _mm512_add_epi8(before, last);
-    v = _mm512_add_epi8(v, _mm512_add_epi8(before, *carry));
-    *carry = _mm512_add_epi8(*carry, _mm512_shuffle_i64x2(total, total, 0xff));
-    return v;
-}
-
-WIDEST static void span_decode_avx512(const uint8_t *even, const uint8_t *odd, size_t n, uint8_t carry[2],
-                                      uint8_t *out)
-{
-    const __m512i low = _mm512_set_epi64(11, 10, 3, 2, 9, 8, 1, 0);
-    const __m512i high = _mm512_set_epi64(15, 14, 7, 6, 13, 12, 5, 4);
-    __m512i ca = _mm512_set1_epi8((char)carry[0]), cb = _mm512_set1_epi8((char)carry[1]);
-    size_t i = 0;
-    for (; i + 64 <= n; i += 64) {
-        __m512i a = running_sum_512(_mm512_loadu_si512(even + i), &ca);
-        __m512i b = running_sum_512(_mm512_loadu_si512(odd + i), &cb);
-        __m512i lo = _mm512_unpacklo_epi8(a, b), hi = _mm512_unpackhi_epi8(a, b);
-        _mm512_storeu_si512(out + 2 * i, _mm512_permutex2var_epi64(lo, low, hi));
-        _mm512_storeu_si512(out + 2 * i + 64, _mm512_permutex2var_epi64(lo, high, hi));
-    }
-    carry[0] = (uint8_t)_mm_extract_epi8(_mm512_castsi512_si128(ca), 0);
-    carry[1] = (uint8_t)_mm_extract_epi8(_mm512_castsi512_si128(cb), 0);
-    span_decode_c(even + i, odd + i, n - i, carry, out + 2 * i);
-}
-
 VECTOR static uint8_t span_skip_avx2(const uint8_t *coded, size_t n, uint8_t carry)
 {
     __m256i sum = _mm256_setzero_si256();
@@ -371,7 +333,7 @@ VECTOR static size_t float_to_half_avx2(const float *in, void *out, size_t n)
 }
 
 static const rl_exr_kernels kernels_avx2 = {
-    .span_decode = span_decode_avx512,
+    .span_decode = span_decode_avx2,
     .span_skip = span_skip_avx2,
     .span_encode = span_encode_avx2,
     .half_to_float = half_to_float_avx2,
@@ -381,12 +343,35 @@ static const rl_exr_kernels kernels_avx2 = {
 
 #endif
 
-const rl_exr_kernels *rl_exr_kernels_best(void)
+static rl_exr_kernels kernels_wide; /* AVX-512 where that is faster */
+static int n_sets = 1;
+static pthread_once_t once = PTHREAD_ONCE_INIT;
+
+static void find_sets(void)
 {
 #ifdef RL_X86
     unsigned a, b, c, d; /* F16C by hand: not every compiler's __builtin_cpu_supports knows it */
-    if (__builtin_cpu_supports("avx2") && __get_cpuid(1, &a, &b, &c, &d) && (c & bit_F16C))
-        return &kernels_avx2;
+    if (!__builtin_cpu_supports("avx2") || !__get_cpuid(1, &a, &b, &c, &d) || !(c & bit_F16C))
+        return;
+    kernels_wide = kernels_avx2;
+    n_sets = rl_exr_kernels_widen(&kernels_wide) ? 3 : 2;
+#endif
+}
+
+const rl_exr_kernels *rl_exr_kernels_at(int i)
+{
+    pthread_once(&once, find_sets);
+    if (i < 0 || i >= n_sets)
+        return NULL;
+#ifdef RL_X86
+    if (i > 0)
+        return i == 1 ? &kernels_avx2 : &kernels_wide;
 #endif
     return &rl_exr_kernels_portable;
+}
+
+const rl_exr_kernels *rl_exr_kernels_best(void)
+{
+    pthread_once(&once, find_sets);
+    return rl_exr_kernels_at(n_sets - 1);
 }

@@ -138,8 +138,8 @@ static void add_image(channel_list *list, const rl_sink_image *image, rl_exr_pix
     }
 }
 
-/* An rgb image carries coverage as A, 1 where there is a material: its own layer's, or the file's when several
- * layers share it. */
+/* An rgb image carries coverage as A, 1 where there is a material: its own layer's, or the file's when
+ * several layers share it. */
 static void add_coverage(channel_list *list, const rl_sink_image *images, size_t n, const rl_sink_frame *f,
                          const region *r, rl_exr_pixel type)
 {
@@ -187,8 +187,8 @@ static size_t add_attributes(const rl_sink_output *o, const rl_sink_frame *f, bo
 }
 
 static rl_code write_exr(const char *path, const rl_sink_output *o, const rl_sink_image *images, size_t n,
-                         const rl_sink_frame *f, const region *r, rl_pool *pool,
-                         uint64_t *clamped, rl_error *err)
+                         const rl_sink_frame *f, const region *r, rl_pool *pool, uint64_t *clamped,
+                         rl_error *err)
 {
     rl_exr_pixel type = o->spec->type == RL_FLOAT ? RL_EXR_FLOAT : RL_EXR_HALF;
     channel_list list = {0};
