@@ -9,13 +9,19 @@ static inline floatv tap(global const float *p, constant frame_t *f, int x, int 
     return rl_load_edge(p, f, x, y);
 }
 
-/* The same; `inside`: the vector and its neighbours to the left and right lie in the image's columns. A constant, so that
- * no load asks again: that keeps what surrounds the loads in one piece. */
 #define COPIED static inline __attribute__((always_inline)) /* a copy for each value of a constant argument */
 
+/* Apart: the few vectors at the edges are not worth compiling it once a load. */
+static __attribute__((noinline)) floatv tap_apart(global const float *p, constant frame_t *f, int x, int y)
+{
+    return tap(p, f, x, y);
+}
+
+/* A tap where it is known whether the vector and its neighbours to the left and right lie in the image's columns: as a
+ * constant, so that no load asks again, which keeps what surrounds the loads in one piece. */
 COPIED floatv tap_near(global const float *p, constant frame_t *f, int x, int y, const int inside)
 {
-    return inside ? rl_load(p, rl_index(f, x, clamp(y, f->valid[1], f->valid[3] - 1))) : tap(p, f, x, y);
+    return inside ? rl_load(p, rl_index(f, x, clamp(y, f->valid[1], f->valid[3] - 1))) : tap_apart(p, f, x, y);
 }
 
 static inline int columns_inside(constant frame_t *f, int x)
