@@ -154,7 +154,7 @@ $(BUILD)/tests/%: $(BUILD)/tests/%.o $(BUILD)/tests/sanitizers.o $(BUILD)/tests/
 $(addprefix $(BUILD)/tests/test_ab_,against json junit measure null words): $(BUILD)/tests/fake_experiment.o
 
 # They load the module; so does whatever writes PNG files.
-$(addprefix $(BUILD)/tests/test_,image_file sg_run diff ab_against ab_sheet ab page_browser): | $(BUILD)/relit_oiio.so
+$(addprefix $(BUILD)/tests/test_,image_file sg_run diff errors experiment faults ab_against ab_energy ab_sheet ab page_browser): | $(BUILD)/relit_oiio.so
 
 test-build: all $(TESTS) $(BENCHES)
 

@@ -5,7 +5,7 @@
 
 typedef struct sums_t {
     floatv w[3], c[3]; /* weights; weights times light */
-    floatv p[3];       /* weighting: surface: weights on the tangent plane */
+    floatv p[3], more[3]; /* weighting: surface: weights on the tangent plane, and how much more those of the surface are */
 #if WANTS_energy
     rejected_t rejected;
 #endif
@@ -13,17 +13,20 @@ typedef struct sums_t {
 
 #define NO_LIGHT {0.0f, 0.0f, 0.0f}
 #if WANTS_energy
-#define NO_SUMS {NO_LIGHT, NO_LIGHT, NO_LIGHT, {NO_LIGHT, NO_LIGHT}}
+#define NO_SUMS {NO_LIGHT, NO_LIGHT, NO_LIGHT, NO_LIGHT, {NO_LIGHT, NO_LIGHT}}
 #else
-#define NO_SUMS {NO_LIGHT, NO_LIGHT, NO_LIGHT}
+#define NO_SUMS {NO_LIGHT, NO_LIGHT, NO_LIGHT, NO_LIGHT}
 #endif
 
 /* What is constant for the pixels of one vector and one material. */
 typedef struct centre_t {
     vector_t v;
-    floatv z;
+    floatv z, ray_x; /* depth; the ray on the plane z = -1 */
+    float ray_y;
     floatv tilt_x, tilt_y; /* of the disk, depth a metre of the screen's plane */
-    plane_t plane;         /* tangent */
+#if P_weighting == WEIGHTING_SURFACE
+    plane_t plane; /* tangent */
+#endif
     float d[3];
     float reach;
     float px, py; /* a pixel's size on the plane z = -1 */
@@ -41,9 +44,19 @@ static inline void burley(floatv r2, const float *d, floatv w[3])
     }
 }
 
+/* Distance², dz deeper and (x, y) away on the plane z = -1, right and down. */
+static inline floatv far2_of(const centre_t *at, float x, float y, floatv dz)
+{
+#if TRUE_DISTANCES
+    return scatter_far2(at->z, at->ray_x, at->ray_y, x, -y, dz);
+#else
+    return fma(at->z * at->z, (floatv)(x * x + y * y), dz * dz);
+#endif
+}
+
 /* Mean of R over the square of the pixel (dx, dy) away, n² nodes. Six nodes for the eight neighbours and
  * three for the sixteen around them leave 1e-5. */
-static inline void burley_square(const centre_t *at, int dx, int dy, floatv dz2, int n, floatv w[3])
+static inline void burley_square(const centre_t *at, int dx, int dy, floatv dz, int n, floatv w[3])
 {
     const float x6[6] = {-0.466234757f, -0.330604693f, -0.119309593f,
                          0.119309593f,  0.330604693f,  0.466234757f};
@@ -51,7 +64,6 @@ static inline void burley_square(const centre_t *at, int dx, int dy, floatv dz2,
                          0.233956967f,  0.180380787f, 0.0856622462f};
     const float x3[3] = {-0.387298335f, 0.0f, 0.387298335f},
                 w3[3] = {0.277777778f, 0.444444444f, 0.277777778f};
-    floatv z2 = at->z * at->z;
     w[0] = w[1] = w[2] = 0.0f;
     for (int j = 0; j < n; j++)
         for (int i = 0; i < n; i++) {
@@ -59,7 +71,7 @@ static inline void burley_square(const centre_t *at, int dx, int dy, floatv dz2,
             float y = ((float)dy + (n == 6 ? x6[j] : x3[j])) * at->py;
             float weight = n == 6 ? w6[i] * w6[j] : w3[i] * w3[j];
             floatv v[3];
-            burley(fma(z2, (floatv)(x * x + y * y), dz2), at->d, v);
+            burley(far2_of(at, x, y, dz), at->d, v);
             for (int c = 0; c < 3; c++)
                 w[c] = fma(v[c], (floatv)weight, w[c]);
         }
@@ -76,21 +88,20 @@ static inline void burley_own(const centre_t *at, floatv w[3])
     }
 }
 
-/* The weights of the pixels (dx, dy) away, r2 = the square of that distance on screen. */
-static inline void weigh(const centre_t *at, int dx, int dy, floatv r2, floatv dz, floatv w[3])
+/* The weights of the pixels (dx, dy) away and dz deeper. */
+static inline void weigh(const centre_t *at, int dx, int dy, floatv dz, floatv w[3])
 {
     int ring = max(abs(dx), abs(dy));
     if (ring == 0)
         burley_own(at, w);
     else if (ring <= 2)
-        burley_square(at, dx, dy, dz * dz, ring == 1 ? 6 : 3, w);
+        burley_square(at, dx, dy, dz, ring == 1 ? 6 : 3, w);
     else
-        burley(fma(dz, dz, r2), at->d, w);
+        burley(far2_of(at, (float)dx * at->px, (float)dy * at->py, dz), at->d, w);
 }
 
 /* The weights that samples would have which are none, for the ledger. */
-static inline void reject(const inputs_t *in, const centre_t *at, int dx, int dy, floatv r2, floatv dz,
-                          intv none, sums_t *s)
+static inline void reject(const inputs_t *in, const centre_t *at, int dx, int dy, intv none, sums_t *s)
 {
 #if WANTS_energy
     floatv w[3], area = 1.0f;
@@ -99,56 +110,65 @@ static inline void reject(const inputs_t *in, const centre_t *at, int dx, int dy
 #if P_weighting != WEIGHTING_PLAIN
     area = rl_vload(0, in->area + at->v.at);
 #endif
-    weigh(at, dx, dy, r2, dz, w);
+    weigh(at, dx, dy, 0.0f, w);
     intv inside = scatter_inside(in->f, &at->v, dx, dy);
     for (int c = 0; c < 3; c++)
         scatter_reject(&s->rejected, c, scatter_keep(w[c] * area, none), inside);
 #endif
 }
 
+#if P_weighting == WEIGHTING_SURFACE
+/* The same pixels on the tangent plane, for the gain: `w` are the weights of those in `same`. What counts as black is on
+ * the plane, so it makes no gain; where the surface has turned away it has no weight. */
+static inline void gather_plane(const inputs_t *in, const centre_t *at, int dx, int dy, intv near, intv same,
+                                intv id, floatv other, const floatv w[3], sums_t *s)
+{
+    floatv flat = scatter_plane_dz(at->z, at->plane.x * (float)dx + at->plane.y * (float)dy);
+    intv away = near & scatter_turned_away(in, &at->v, dx, dy, id, other, at->z + flat);
+    intv counts = same | away | (near & at->keep);
+    if (!scatter_any(counts))
+        return;
+    floatv p[3], stands = rl_vload(0, in->area + at->v.at) * scatter_plane_area(at->z, flat);
+    weigh(at, dx, dy, flat, p);
+    for (int c = 0; c < 3; c++) {
+        p[c] = scatter_keep(p[c] * stands, counts);
+        s->p[c] += p[c];
+        s->more[c] += scatter_keep(w[c], same) - scatter_keep(p[c], same | (away & ~at->keep));
+    }
+}
+#endif
+
 /* The pixels (dx, dy) away join the sums of the lanes in `mine`. */
 static inline void gather(const inputs_t *in, const centre_t *at, int dx, int dy, intv mine, sums_t *s)
 {
+    floatv rise = 0.0f; /* how much deeper the disk is */
     float x = (float)dx * at->px, y = (float)dy * at->py;
-    floatv z2 = at->z * at->z, r2 = z2 * (x * x + y * y), disk2 = r2, flat = 0.0f;
 #if P_orientation == ORIENTATION_TANGENT
-    floatv rise = at->tilt_x * x + at->tilt_y * y;
-    disk2 += z2 * rise * rise;
+    rise = scatter_plane_dz(at->z, at->z * (at->tilt_x * x + at->tilt_y * y));
 #endif
     int i = scatter_at(in->f, &at->v, dx, dy);
-    intv near = mine & (disk2 <= at->reach * at->reach), id = rl_as_intv(rl_vload(0, in->stencil + i));
-    intv same = near & (id == at->material), counts = near & (same | at->keep);
-    floatv other = rl_vload(0, in->depth + i), dz = scatter_keep(other - at->z, same), w[3];
-#if P_weighting == WEIGHTING_SURFACE
-    flat = at->plane.x * (float)dx + at->plane.y * (float)dy;
-    floatv p[3];
-    intv away = scatter_turned_away(in, &at->v, dx, dy, id, other, at->z + flat);
-    reject(in, at, dx, dy, r2, flat, near & ~same, s);
-    intv planar = near & (same | at->keep | away);
-    if (!scatter_any(planar))
-        return;
-    dz = rl_select(flat, dz, same);
-    weigh(at, dx, dy, r2, flat, p);
-    floatv own = rl_vload(0, in->area + at->v.at);
-    for (int c = 0; c < 3; c++)
-        s->p[c] += scatter_keep(p[c] * own, planar);
-#else
-    reject(in, at, dx, dy, r2, flat, near & ~same, s);
-    if (!scatter_any(counts))
-        return;
-#endif
-    weigh(at, dx, dy, r2, dz, w);
+    intv near = mine & (far2_of(at, x, y, rise) <= at->reach * at->reach);
+    intv id = rl_as_intv(rl_vload(0, in->stencil + i)), same = near & (id == at->material);
+    intv counts = near & (same | at->keep);
+    floatv other = rl_vload(0, in->depth + i), w[3] = NO_LIGHT;
+    reject(in, at, dx, dy, near & ~same, s);
+    if (scatter_any(counts)) {
+        weigh(at, dx, dy, scatter_keep(other - at->z, same), w);
 #if P_weighting != WEIGHTING_PLAIN
-    floatv surface = rl_select(rl_vload(0, in->area + at->v.at), rl_vload(0, in->area + i), same);
+        floatv stands = rl_vload(0, in->area + at->v.at);
+        stands = rl_select(stands, rl_vload(0, in->area + i), same);
+        for (int c = 0; c < 3; c++)
+            w[c] *= stands;
 #endif
-    for (int c = 0; c < 3; c++) {
-#if P_weighting != WEIGHTING_PLAIN
-        w[c] *= surface;
-#endif
-        w[c] = scatter_keep(w[c], counts);
-        s->w[c] += w[c];
-        s->c[c] = fma(w[c], scatter_keep(rl_vload(0, in->diffuse + c * in->f->plane4 + i), same), s->c[c]);
+        for (int c = 0; c < 3; c++) {
+            w[c] = scatter_keep(w[c], counts);
+            s->w[c] += w[c];
+            s->c[c] = fma(w[c], scatter_keep(rl_vload(0, in->diffuse + c * in->f->plane4 + i), same), s->c[c]);
+        }
     }
+#if P_weighting == WEIGHTING_SURFACE
+    gather_plane(in, at, dx, dy, near, same, id, other, w, s);
+#endif
 }
 
 static inline void filter_material(const inputs_t *in, const vector_t *v, int material,
@@ -157,6 +177,8 @@ static inline void filter_material(const inputs_t *in, const vector_t *v, int ma
     centre_t at;
     at.v = *v;
     at.z = rl_vload(0, in->depth + v->at);
+    at.ray_x = rl_ray_x(in->f, &in->f->camera, rl_to_floatv((RL_LANES + v->sx) * 4 + v->px));
+    at.ray_y = rl_ray_y(in->f, &in->f->camera, (float)(4 * v->sy + v->py));
 #if P_orientation == ORIENTATION_TANGENT
     at.tilt_x = scatter_tilt(in, v, at.z, 1, 0);
     at.tilt_y = scatter_tilt(in, v, at.z, 0, 1);
@@ -168,15 +190,20 @@ static inline void filter_material(const inputs_t *in, const vector_t *v, int ma
     at.material = material;
     at.keep = mat->profile_border == BORDER_OCCLUDE ? -1 : 0;
     at.reach = BURLEY_RADIUS * fmax(at.d[0], fmax(at.d[1], at.d[2]));
-    float nearest = scatter_nearest(at.z, mine);
-    int ry = (int)fmin(at.reach / (nearest * at.py), 16384.0f);
+    float nearest = scatter_nearest(at.z, mine), reach = at.reach;
+#if P_orientation == ORIENTATION_TANGENT /* what stands nearer to the camera is farther apart, and more so off the axis */
+    reach *= sqrt(1.0f + at.ray_y * at.ray_y + scatter_farthest(at.ray_x * at.ray_x, mine));
+    nearest = fmax(nearest - at.reach, 0.5f * nearest);
+#endif
+    int ry = (int)fmin(reach / (nearest * at.py), 16384.0f);
 #if P_weighting == WEIGHTING_SURFACE
-    at.plane = scatter_plane(in, v, at.z);
+    at.plane = scatter_plane(in, v);
+    floatv cosine = scatter_cosine(at.z, at.ray_x, at.ray_y, rl_vload(0, in->area + v->at));
 #endif
     sums_t total = NO_SUMS;
     for (int dy = -ry; dy <= ry; dy++) {
         float y = (float)dy * at.py * nearest;
-        int rx = (int)fmin(sqrt(fmax(at.reach * at.reach - y * y, 0.0f)) / (nearest * at.px), 16384.0f) + 1;
+        int rx = (int)fmin(sqrt(fmax(reach * reach - y * y, 0.0f)) / (nearest * at.px), 16384.0f) + 1;
         sums_t row = NO_SUMS; /* rows first: less is lost to rounding */
         for (int dx = -rx; dx <= rx; dx++)
             gather(in, &at, dx, dy, mine, &row);
@@ -184,6 +211,7 @@ static inline void filter_material(const inputs_t *in, const vector_t *v, int ma
             total.w[c] += row.w[c];
             total.c[c] += row.c[c];
             total.p[c] += row.p[c];
+            total.more[c] += row.more[c];
 #if WANTS_energy
             total.rejected.border[c] += row.rejected.border[c];
             total.rejected.off_screen[c] += row.rejected.off_screen[c];
@@ -193,7 +221,7 @@ static inline void filter_material(const inputs_t *in, const vector_t *v, int ma
     for (int c = 0; c < 3; c++) {
         floatv over = 1.0f / total.w[c];
 #if P_weighting == WEIGHTING_SURFACE
-        over = fma(at.plane.cosine, 1.0f / total.p[c] - over, over);
+        over *= fma(cosine, total.more[c] / total.p[c], (floatv)1.0f);
 #endif
 #if WANTS_energy
         floatv all[SCATTER_OUT], own = out[c];

@@ -170,15 +170,7 @@ const rl_form rl_scatter_forms[RL_SCATTER_FORMS] = {
 };
 
 const rl_port rl_scatter_ports[RL_SCATTER_PORTS] = {
-    {"diffuse", RL_READ, RL_RGB, .help = "radiance below the surface", .layout = RL_PHASE4},
-    {"lit", RL_READ, RL_RGB, .help = "radiance that does not scatter"},
-    {"albedo", RL_READ, RL_RGB, .help = "0..1"},
-    {"normal", RL_READ, RL_NORMAL, .help = "shading normal, for the way out"},
-    {"depth", RL_READ, RL_SCALAR, .help = "planar, metres", .layout = RL_PHASE4},
-    {"stencil", RL_READ, RL_ID, .help = "material", .layout = RL_PHASE4},
-    {"area", RL_SCRATCH, RL_SCALAR, .help = "surface that a pixel sees", .layout = RL_PHASE4},
-    {"filtered", RL_SCRATCH, RL_RGB, .help = "scattered radiance below the surface", .layout = RL_PHASE4},
-    {"color", RL_WRITE, RL_RGB, .help = "radiance, scene-linear"},
+    RL_ROWS_SCATTER_PORTS,
     RL_SCATTER_LEDGER(RL_PHASE4),
 };
 

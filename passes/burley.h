@@ -61,7 +61,21 @@ double rl_burley_scale(rl_burley_fit fit, double albedo);
 
 /* Ports of the passes that filter with a disk of pixels (kernels/scatter.cl), and the rows that they share:
  * identical rows in several passes are one field of the material table. */
-#define RL_SCATTER_PORTS        14
+#define RL_SCATTER_PORTS 14
+/* Those before the ledger's, for passes with more. */
+#define RL_ROWS_SCATTER_PORTS                                                                                \
+    {"diffuse", RL_READ, RL_RGB, .help = "radiance below the surface", .layout = RL_PHASE4},                 \
+        {"lit", RL_READ, RL_RGB, .help = "radiance that does not scatter"},                                  \
+        {"albedo", RL_READ, RL_RGB, .help = "0..1"},                                                         \
+        {"normal", RL_READ, RL_NORMAL, .help = "shading normal, for the way out"},                           \
+        {"depth", RL_READ, RL_SCALAR, .help = "planar, metres", .layout = RL_PHASE4},                        \
+        {"stencil", RL_READ, RL_ID, .help = "material", .layout = RL_PHASE4},                                \
+        {"area", RL_SCRATCH, RL_SCALAR, .help = "surface that a pixel sees", .layout = RL_PHASE4},           \
+        {"filtered", RL_SCRATCH, RL_RGB, .help = "scattered radiance below the surface",                     \
+         .layout = RL_PHASE4},                                                                               \
+    {                                                                                                        \
+        "color", RL_WRITE, RL_RGB, .help = "radiance, scene-linear"                                          \
+    }
 #define RL_SCATTER_PROFILE_ROWS 8
 #define RL_SCATTER_SHADING_ROWS 2
 extern const rl_port rl_scatter_ports[RL_SCATTER_PORTS];

@@ -23,8 +23,18 @@ static const rl_param params[] = {
 };
 RL_PARAMS_MATCH(sss_burley_params, 5);
 
+enum { WEIGHTING_SURFACE = 2 };
+
+static const rl_port ports[] = {
+    RL_ROWS_SCATTER_PORTS,
+    {"gain", RL_SCRATCH, RL_SCALAR, .help = "what curvature adds to the light, of one pixel of 4x4",
+     .layout = RL_PHASE4, .when = "weighting", .is = WEIGHTING_SURFACE},
+    RL_SCATTER_LEDGER(RL_PHASE4),
+};
+
 static const rl_step steps[] = {
     {"sss_burley_area", .domain = RL_EVERY_PHASE},
+    {"sss_burley_gain", .domain = RL_EVERY_PHASE, .when = "weighting", .is = WEIGHTING_SURFACE},
     {"sss_burley_filter", .domain = RL_EVERY_PHASE},
     {"sss_burley_resolve", .domain = RL_EVERY_VECTOR},
     {"sss_burley_energy", .domain = RL_EVERY_BAND, .with = "energy"},
@@ -33,11 +43,11 @@ static const rl_step steps[] = {
 /* As kernels/sss_burley.cl reads it: 256 directions (cos, sin); for each material where its patterns start,
  * in floats from the table's start (exact, below 2^24); the patterns, which materials whose channels have the
  * same proportions share. A set of patterns is those for `taps`, or with `auto` those for 21 and those for
- * 55. There are up to 15 for a number of taps, an odd number of them, their radii offset by (j +
- * 1/2)/patterns: the one in the middle by a half. A pattern is its x, y and weights, each padded to a
- * multiple of 64, and for each channel the sum of its weights on a plane beside the mean of those of all
- * patterns. */
-enum { TURNS = 256, TAP_BLOCK = 64, MOST_PATTERNS = 15, PATTERN_TAPS = 4096 };
+ * 55, and with `weighting: surface` those for the gain, twice as many taps. There are up to 15 for a number
+ * of taps, an odd number of them, their radii offset by (j + 1/2)/patterns: the one in the middle by a half.
+ * A pattern is its x, y and weights, each padded to a multiple of 64, and for each channel the sum of its
+ * weights on a plane beside the mean of those of all patterns. */
+enum { TURNS = 256, TAP_BLOCK = 64, MOST_PATTERNS = 15, PATTERN_TAPS = 4096, MOST_TAPS = 4096 };
 
 static size_t tap_stride(size_t taps)
 {
@@ -72,6 +82,21 @@ static void make_patterns(size_t taps, const double d[3], float *to)
             to[j * (3 * stride + 3) + 3 * stride + (size_t)c] = (float)(sum[j][c] / mean[c]);
 }
 
+/* For how many taps there are patterns: those for one size on screen or for two, and twice as many as the
+ * larger to find the gain with. Returns how many counts. */
+static size_t tap_counts(const sss_burley_params *p, size_t counts[3])
+{
+    size_t n = 0;
+    counts[n++] = p->taps > 0 ? (size_t)p->taps : 21;
+    if (p->taps < 0)
+        counts[n++] = 55;
+    if (p->weighting == WEIGHTING_SURFACE) {
+        counts[n] = 2 * counts[n - 1] < MOST_TAPS ? 2 * counts[n - 1] : MOST_TAPS;
+        n++;
+    }
+    return n;
+}
+
 /* A material's scattering distances in units of the largest; false: it has none. */
 static bool proportions(const struct rl_materials *m, size_t material, double d[3])
 {
@@ -98,8 +123,9 @@ static rl_code tables(const rl_pass_input *in, rl_arena *arena, rl_tables *out, 
 {
     const sss_burley_params *p = in->params;
     size_t materials = rl_material_count(in->materials), sets = 0, n = 2 * TURNS + materials;
-    size_t taps[2] = {p->taps > 0 ? (size_t)p->taps : 21, 55};
-    size_t per_set = patterns_floats(taps[0]) + (p->taps > 0 ? 0 : patterns_floats(taps[1]));
+    size_t taps[3], n_taps = tap_counts(p, taps), per_set = 0;
+    for (size_t k = 0; k < n_taps; k++)
+        per_set += patterns_floats(taps[k]);
     double d[3];
     for (size_t i = 0; i < materials; i++)
         sets += proportions(in->materials, i, d) && first_alike(in->materials, i, d) == i;
@@ -121,10 +147,10 @@ static rl_code tables(const rl_pass_input *in, rl_arena *arena, rl_tables *out, 
         starts[i] = first < i ? starts[first] : (float)n;
         if (first < i)
             continue;
-        make_patterns(taps[0], d, out->data + n);
-        if (p->taps < 0)
-            make_patterns(taps[1], d, out->data + n + patterns_floats(taps[0]));
-        n += per_set;
+        for (size_t k = 0; k < n_taps; k++) {
+            make_patterns(taps[k], d, out->data + n);
+            n += patterns_floats(taps[k]);
+        }
     }
     return RL_OK;
 }
@@ -148,12 +174,13 @@ const rl_pass rl_pass_sss_burley = {
     .help = "subsurface scattering with Burley's profile, a few importance-sampled taps a pixel",
     .source = "Golubev, Efficient screen-space subsurface scattering, SIGGRAPH 2018",
     .kernel = "sss_burley.cl",
-    .kernel_prelude = "energy.cl scatter.cl pattern.cl",
+    .kernel_prelude = "energy.cl scatter.cl scatter_surface.cl scatter_ledger.cl pattern.cl "
+                      "burley_taps.cl burley_gain.cl",
     .params = RL_ARRAY(params),
     .params_size = sizeof(sss_burley_params),
     .profile_keys = RL_ARRAY(rl_scatter_profile_rows),
     .shading_keys = RL_ARRAY(rl_scatter_shading_rows),
-    .ports = RL_ARRAY(rl_scatter_ports),
+    .ports = RL_ARRAY(ports),
     .steps = RL_ARRAY(steps),
     .tables = tables,
     .stochastic = stochastic,

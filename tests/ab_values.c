@@ -6,6 +6,8 @@
 #include <string.h>
 #include <cmocka.h>
 
+#include "graph/base/alloc.h"
+
 void ab_values_make(ab_values *v, rl_experiment *e, size_t n_variants, size_t n_listed)
 {
     memset(v, 0, sizeof *v);
@@ -54,4 +56,19 @@ void ab_values_null(ab_values *v, size_t capture, int material, double mean)
                                                   .metric = RL_METRIC_FLIP,
                                                   .n = 9,
                                                   .bounds = {mean, mean / 2, 2 * mean, 4 * mean}};
+}
+
+void ab_values_starve(const ab_values *v, ab_writer *write)
+{
+    size_t before = rl_alloc_live();
+    for (unsigned long n = 1, done = 0; !done; n++) {
+        rl_str text = {0};
+        rl_error err = {0};
+        rl_alloc_fail_at(n, 0);
+        rl_code code = write(&v->report, &text, &err);
+        done = rl_alloc_fail_at(0, 0) > 0;
+        assert_int_equal(code, done ? RL_OK : RL_E_MEMORY);
+        rl_str_free(&text);
+        assert_int_equal(rl_alloc_live(), before);
+    }
 }

@@ -25,4 +25,9 @@ void ab_values_add(ab_values *v, size_t capture, size_t pair, size_t index, int 
 /* The bounds of flip's mean, and twice that for p95. */
 void ab_values_null(ab_values *v, size_t capture, int material, double mean);
 
+/* What is written about a report. */
+typedef rl_code ab_writer(const rl_ab_report *report, rl_str *out, rl_error *err);
+/* Fails each allocation of `write` in turn: an error of memory, and nothing is left behind. */
+void ab_values_starve(const ab_values *v, ab_writer *write);
+
 #endif

@@ -3,6 +3,7 @@
 
 #include "passes/burley.h"
 #include "tests/back_scene.h"
+#include "tests/twin_hash.h"
 
 static const double pi = 3.14159265358979323846;
 
@@ -115,23 +116,13 @@ static group group_of(const back_scene *s, int x, int y, float d_max)
     }
 }
 
-static uint32_t hash(uint32_t a, uint32_t b, uint32_t c, uint32_t d)
-{
-    uint32_t h = a * 0x9E3779B1u ^ b * 0x85EBCA77u ^ c * 0xC2B2AE3Du ^ d * 0x27D4EB2Fu;
-    h ^= h >> 15;
-    h *= 0x2C1B3C6Du;
-    h ^= h >> 12;
-    h *= 0x297A2D39u;
-    return h ^ (h >> 15);
-}
-
 /* Rotation none or blue: turn and offset as shares of 1. */
 static void choice_of(const back_scene *s, int x, int y, back_params p, double choice[2])
 {
     static const int order[4][4] = {{2, 3, 12, 6}, {14, 8, 4, 10}, {1, 11, 0, 5}, {15, 7, 13, 9}};
     const double g = 1.32471795724474602596;
     for (int i = 0; i < 2; i++) {
-        double shift = ldexp(hash((uint32_t)p.seed, 0, 0, (uint32_t)i + 1), -32);
+        double shift = ldexp(twin_hash((uint32_t)p.seed, 0, 0, (uint32_t)i + 1), -32);
         double r2 = (s->frame.number + 16.0 * order[y & 3][x & 3]) * (i ? 1 / g : 1 / (g * g)) + shift;
         choice[i] = p.rotation == 0 ? (i ? 0.5 : 0) : r2 - floor(r2);
     }

@@ -113,10 +113,10 @@ static double run_ours(cl_session *session, const scene *s, int taps, int weight
                                {"albedo", s->albedo, NULL},   {"normal", s->normal, NULL},
                                {"depth", s->depth, NULL},     {"stencil", s->stencil, NULL},
                                {"color", NULL, color}};
-    double ms[3] = {0};
+    double ms[8] = {0};
     cl_job job = {
         &rl_pass_sss_burley, &s->frame, &params, materials, sizeof materials, images, 7, repeat, ms, 0};
-    return cl_run(session, &job) ? ms[0] + ms[1] + ms[2] : -1;
+    return cl_run(session, &job) ? ms[0] + ms[1] + ms[2] + ms[3] : -1;
 }
 
 static char *talk_text(const scene *s, int taps)

@@ -47,6 +47,31 @@ void capture_stop(void)
     rl_str_free(&said);
 }
 
+int capture_setup(void **state)
+{
+    (void)state;
+    return capture_start() ? 0 : -1;
+}
+
+int capture_teardown(void **state)
+{
+    (void)state;
+    capture_stop();
+    return 0;
+}
+
+char *capture_lit(const capture_form *form, int frames)
+{
+    scene_camera c = scene_camera_default();
+    scene s = scene_make(&c, SCENE_LIGHTS, SCENE_KEY | SCENE_RIM);
+    char *folder = folder_new();
+    for (int i = 1; i <= frames; i++)
+        capture_write(folder, form, &s, i);
+    capture_manifest(folder, form, &s, 1);
+    scene_free(&s);
+    return folder;
+}
+
 const char *capture_log(void)
 {
     return rl_str_text(&said);

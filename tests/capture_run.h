@@ -12,6 +12,12 @@ extern const char capture_pipeline[];
 /* Kernels are compiled once a test program: a folder of its own for their cache. False when there is none. */
 bool capture_start(void);
 void capture_stop(void);
+/* The same as a group's setup and teardown. */
+int capture_setup(void **state);
+int capture_teardown(void **state);
+
+/* A folder with frames 1 … `frames` of the scene with all lights, the key and rim shadowed, in this form. */
+char *capture_lit(const capture_form *form, int frames);
 
 /* A session on folder/capture.yaml that keeps color, depth, normal, stencil, albedo, motion and thickness.
  * Options that are set in `more` (may be NULL) are taken over. Fails the test on an error, which it prints.

@@ -244,6 +244,32 @@ void made_clean(void)
     folder[0] = 0;
 }
 
+void made_good(rl_code code, const rl_error *err)
+{
+    if (code)
+        fail_msg("%s: %s: %s", rl_code_name(code), err->file, err->text);
+}
+
+rl_pool *made_pools[3];
+
+int made_setup(void **state)
+{
+    (void)state;
+    rl_error err = {0};
+    for (int i = 0; i < 3; i++)
+        made_good(rl_pool_new(1 << i, &made_pools[i], &err), &err);
+    return 0;
+}
+
+int made_teardown(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 3; i++)
+        rl_pool_free(&made_pools[i]);
+    made_clean();
+    return 0;
+}
+
 uint32_t made_random(uint32_t *state)
 {
     uint32_t x = *state ? *state : 1;

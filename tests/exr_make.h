@@ -7,6 +7,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "graph/base/pool.h"
 #include "graph/run/exr.h"
 
 typedef struct made_channel {
@@ -52,6 +53,14 @@ const char *made_path(const char *name);
 void made_clean(void);
 /* How many files are in it. */
 int made_count(void);
+
+/* Fails the running test with the error, if there is one. */
+void made_good(rl_code code, const rl_error *err);
+
+/* A group's setup and teardown: pools of 1, 2 and 4 threads, and made_clean. */
+extern rl_pool *made_pools[3];
+int made_setup(void **state);
+int made_teardown(void **state);
 
 /* Deterministic noise. */
 uint32_t made_random(uint32_t *state);

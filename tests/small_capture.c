@@ -109,6 +109,27 @@ void small_capture_write(const char *folder)
     file_write(folder, "pipe.yaml", small_pipeline, strlen(small_pipeline));
 }
 
+char *small_folder, *small_pipe, *small_out;
+
+int small_setup(void **state)
+{
+    (void)state;
+    small_folder = folder_new();
+    small_capture_write(small_folder);
+    small_pipe = path_in(small_folder, "pipe.yaml");
+    small_out = path_in(small_folder, "out");
+    return 0;
+}
+
+int small_teardown(void **state)
+{
+    (void)state;
+    folder_remove(small_folder);
+    free(small_pipe);
+    free(small_out);
+    return 0;
+}
+
 /* ---- runs ------------------------------------------------------------------------------------------------
  */
 

@@ -15,6 +15,12 @@ enum { SMALL_WIDTH = 64, SMALL_HEIGHT = 48, SMALL_FRAMES = 3, SMALL_OUTPUTS = 3 
 void small_capture_write(const char *folder);
 extern const char small_manifest[], small_pipeline[];
 
+/* A group's setup and teardown: a fresh folder with the capture in it, its pipeline, and `out` in it, which
+ * is not there yet. */
+int small_setup(void **state);
+int small_teardown(void **state);
+extern char *small_folder, *small_pipe, *small_out;
+
 /* What became of a session that opened, ran and closed. */
 typedef struct small_run {
     rl_code code; /* of the first call that failed */

@@ -17,7 +17,7 @@ static int patterns_of(int n)
 
 const patterns_t *patterns_for(int n, const double d[3])
 {
-    enum { KEPT = 8 };
+    enum { KEPT = 32 }; /* callers hold one while they ask for others */
     static patterns_t kept[KEPT];
     static int next;
     for (int i = 0; i < KEPT; i++)

@@ -60,6 +60,47 @@ void sss_scene_free(sss_scene *s)
         rl_free(all[i]);
 }
 
+/* Where pixel (x, y) of `part` is in a plane of `whole`. */
+static size_t index_in(const sss_scene *whole, const sss_scene *part, int x, int y)
+{
+    const frame_t *a = &whole->twin.frame, *b = &part->twin.frame;
+    x += b->origin[0] - a->origin[0];
+    y += b->origin[1] - a->origin[1];
+    return (size_t)y * (size_t)a->columns + (size_t)x;
+}
+
+void sss_scene_crop(sss_scene *part, const sss_scene *whole)
+{
+    memcpy(part->twin.frame.camera.centre, whole->twin.frame.camera.centre, sizeof(float[2]));
+    SSS_EACH_PIXEL(part, x, y, to)
+    {
+        size_t from = index_in(whole, part, x, y);
+        part->stencil[to] = whole->stencil[from];
+        part->depth[to] = whole->depth[from];
+        for (size_t c = 0; c < 3; c++) {
+            part->diffuse[c * part->n + to] = whole->diffuse[c * whole->n + from];
+            part->lit[c * part->n + to] = whole->lit[c * whole->n + from];
+            part->albedo[c * part->n + to] = whole->albedo[c * whole->n + from];
+            part->normal[c * part->n + to] = whole->normal[c * whole->n + from];
+        }
+    }
+}
+
+void sss_crop_is_same(const sss_scene *part, const sss_scene *whole, int left_right, int top_bottom)
+{
+    const int *valid = part->twin.frame.valid;
+    SSS_EACH_PIXEL(part, x, y, i)
+    {
+        if (x < valid[0] + left_right || x >= valid[2] - left_right || y < valid[1] + top_bottom ||
+            y >= valid[3] - top_bottom)
+            continue;
+        size_t from = index_in(whole, part, x, y);
+        for (size_t c = 0; c < 3; c++)
+            assert_memory_equal(&whole->color[c * whole->n + from], &part->color[c * part->n + i],
+                                sizeof(float));
+    }
+}
+
 float sss_random(uint32_t *state)
 {
     *state = *state * 1664525u + 1013904223u;

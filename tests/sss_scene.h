@@ -51,6 +51,11 @@ void sss_scene_random(sss_scene *s, uint32_t seed);
 /* A plane parallel to the screen, one material, `light` everywhere. */
 void sss_scene_flat(sss_scene *s, uint32_t id, float depth, float light);
 
+/* The same picture with another data window: what `whole` holds at the pixels of `part`, which lies in it. */
+void sss_scene_crop(sss_scene *part, const sss_scene *whole);
+/* Their s->color has the same bits, but for so many pixels along the border of `part`. */
+void sss_crop_is_same(const sss_scene *part, const sss_scene *whole, int left_right, int top_bottom);
+
 /* Fill s->color and s->filtered. `orientation` and `rotation` are the scene's. */
 void sss_run(sss_scene *s, const rl_pass *pass, const void *params, cl_session *on);
 void sss_run_burley(sss_scene *s, int taps, int weighting);

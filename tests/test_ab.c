@@ -20,7 +20,6 @@
 #include "tests/tool_run.h"
 
 static char *folder, *pipe_file, *out;
-static char program[4096]; /* relit itself, beside the tests */
 
 static int setup(void **state)
 {
@@ -447,8 +446,8 @@ static void test_signal(void **state)
         dup2(results[1], 1);
         close(results[0]);
         if (freopen(said, "w", stderr))
-            execl(program, "relit", "ab", pipe_file, "--vary", "graph.sss.taps=21,4", "--seeds", "1", "--out",
-                  out, "--json", "--only", "beauty", (char *)NULL);
+            execl(tool_program(), "relit", "ab", pipe_file, "--vary", "graph.sss.taps=21,4", "--seeds", "1",
+                  "--out", out, "--json", "--only", "beauty", (char *)NULL);
         _exit(127);
     }
     close(results[1]);
@@ -607,11 +606,6 @@ static void test_plan_drawn(void **state)
 
 int main(void)
 {
-    ssize_t n = readlink("/proc/self/exe", program, sizeof program - 16);
-    program[n > 0 ? n : 0] = 0;
-    for (int i = 0; i < 2 && strrchr(program, '/'); i++) /* BUILD/tests/test_ab -> BUILD */
-        *strrchr(program, '/') = 0;
-    strcat(program, "/relit");
     const struct CMUnitTest tests[] = {
         TEST(test_grid),           TEST(test_pipelines), TEST(test_capture_lights), TEST(test_spellings),
         TEST(test_no_such_kernel), TEST(test_against),   TEST(test_over),           TEST(test_failed_frame),

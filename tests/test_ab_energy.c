@@ -14,35 +14,14 @@
 #include "tests/small_capture.h"
 #include "tests/tool_run.h"
 
-static char *folder, *pipe_file, *out;
-
-static int setup(void **state)
-{
-    (void)state;
-    folder = folder_new();
-    small_capture_write(folder);
-    pipe_file = path_in(folder, "pipe.yaml");
-    out = path_in(folder, "out");
-    return 0;
-}
-
-static int teardown(void **state)
-{
-    (void)state;
-    free(pipe_file);
-    free(out);
-    folder_remove(folder);
-    return 0;
-}
-
 #define RUN(...) tool_run((const char *const[]){__VA_ARGS__, NULL})
-#define AB(...)  RUN("ab", pipe_file, "--out", out, "--quiet", "--seeds", "1", __VA_ARGS__)
+#define AB(...)  RUN("ab", small_pipe, "--out", small_out, "--quiet", "--seeds", "1", __VA_ARGS__)
 
 static json_t *metrics(void)
 {
     size_t size;
     json_error_t error;
-    char *path = path_in(out, "metrics.json"), *text = file_read(path, &size);
+    char *path = path_in(small_out, "metrics.json"), *text = file_read(path, &size);
     json_t *root = json_loads(text, 0, &error);
     if (!root)
         fail_msg("metrics.json: %s", error.text);
@@ -136,7 +115,7 @@ static void test_last_frame(void **state)
 static void test_no_last_frame(void **state)
 {
     (void)state;
-    char *last = path_in(folder, "s.0003.exr"), *away = path_in(folder, "s.away");
+    char *last = path_in(small_folder, "s.0003.exr"), *away = path_in(small_folder, "s.away");
     assert_int_equal(rename(last, away), 0);
     tool_result r = AB("--vary", "graph.sss.taps=21,55");
     assert_int_equal(rename(away, last), 0);
@@ -195,11 +174,11 @@ static void test_nothing_to_check(void **state)
 static void test_no_picture(void **state)
 {
     (void)state;
-    tool_result r = RUN("run", pipe_file, "--out", out, "--quiet", "--dump", "sss.energy");
+    tool_result r = RUN("run", small_pipe, "--out", small_out, "--quiet", "--dump", "sss.energy");
     assert_int_equal(r.status, 2);
     assert_non_null(strstr(r.err, "'sss.energy' is sums over a frame, no image"));
     tool_result_free(&r);
-    r = RUN("run", pipe_file, "--out", out, "--quiet", "--set", "graph.aa.in.color=sss.energy");
+    r = RUN("run", small_pipe, "--out", small_out, "--quiet", "--set", "graph.aa.in.color=sss.energy");
     assert_int_equal(r.status, 2);
     assert_non_null(strstr(r.err, "'sss.energy' is sums"));
     tool_result_free(&r);
@@ -215,5 +194,5 @@ int main(void)
         cmocka_unit_test(test_nothing_to_check),
         cmocka_unit_test(test_no_picture),
     };
-    return cmocka_run_group_tests(tests, setup, teardown);
+    return cmocka_run_group_tests(tests, small_setup, small_teardown);
 }

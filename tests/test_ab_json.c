@@ -11,7 +11,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "graph/base/alloc.h"
 #include "graph/tool/ab_json.h"
 #include "tests/ab_values.h"
 
@@ -249,17 +248,7 @@ static void test_memory(void **state)
 {
     (void)state;
     ab_values_add(&v, 0, 0, 0, RL_AB_WHOLE, 0.1, 0.25);
-    size_t before = rl_alloc_live();
-    for (unsigned long n = 1, done = 0; !done; n++) {
-        rl_str text = {0};
-        rl_error err = {0};
-        rl_alloc_fail_at(n, 0);
-        rl_code code = rl_ab_json(&v.report, &text, &err);
-        done = rl_alloc_fail_at(0, 0) > 0;
-        assert_int_equal(code, done ? RL_OK : RL_E_MEMORY);
-        rl_str_free(&text);
-        assert_int_equal(rl_alloc_live(), before);
-    }
+    ab_values_starve(&v, rl_ab_json);
 }
 
 int main(void)

@@ -10,7 +10,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "graph/base/alloc.h"
 #include "graph/tool/ab_table.h"
 #include "graph/tool/ab_words.h"
 #include "tests/ab_values.h"
@@ -310,17 +309,7 @@ static void test_memory(void **state)
     (void)state;
     ab_values_make(&v, e, 3, 2);
     add_two_frames(0, 1);
-    size_t before = rl_alloc_live();
-    for (unsigned long n = 1, done = 0; !done; n++) {
-        rl_str text = {0};
-        rl_error err = {0};
-        rl_alloc_fail_at(n, 0);
-        rl_code code = rl_ab_words(&v.report, &text, &err);
-        done = rl_alloc_fail_at(0, 0) > 0;
-        assert_int_equal(code, done ? RL_OK : RL_E_MEMORY);
-        rl_str_free(&text);
-    }
-    assert_int_equal(rl_alloc_live(), before);
+    ab_values_starve(&v, rl_ab_words);
 }
 
 int main(void)

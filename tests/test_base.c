@@ -333,6 +333,18 @@ static void test_nearest(void **state)
     rl_str_free(&s);
     rl_suggest(&s, "zzz", known, 0, "ports");
     assert_string_equal(rl_str_text(&s), "");
+    /* a beginning, of one only, and of some length */
+    static const char *const words[] = {"lambert", "shadow_steps", "shadow_side"};
+    const char *const beginnings[][2] = {
+        {"Lam", "; did you mean 'lambert'? of: lambert, shadow_side, shadow_steps"},
+        {"shadow", "; of: lambert, shadow_side, shadow_steps"},
+        {"la", "; of: lambert, shadow_side, shadow_steps"}};
+    for (size_t i = 0; i < 3; i++) {
+        rl_suggest(&s, beginnings[i][0], words, 3, "of");
+        assert_string_equal(rl_str_text(&s), beginnings[i][1]);
+        rl_str_free(&s);
+    }
+    assert_null(rl_nearest("lam", words, 3));
 }
 
 static void test_errors(void **state)

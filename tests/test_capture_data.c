@@ -15,19 +15,6 @@
 #include "tests/capture_sequence.h"
 #include "tests/tool_run.h"
 
-static int setup(void **state)
-{
-    (void)state;
-    return capture_start() ? 0 : -1;
-}
-
-static int teardown(void **state)
-{
-    (void)state;
-    capture_stop();
-    return 0;
-}
-
 /* ---- sizes ---- */
 
 static void test_sizes_in_a_sequence(void **state)
@@ -137,12 +124,19 @@ static void test_counts(void **state)
         char *folder = sequence_make(&f, s, 2);
         for (int i = 0; i < 5; i++)
             assert_int_equal(s[0].id[i], 0);
-        sequence_run(folder, capture_pipeline, (rl_options){0}, &o);
+        capture_log_clear();
+        sequence_run(folder, capture_pipeline, (rl_options){.log = &capture_logger}, &o);
         assert_int_equal(o.summary.failed, 0);
         assert_int_equal(o.nonfinite[1], 5);
         assert_int_equal(o.clamped[1], 3);
         assert_int_equal(o.summary.nonfinite, 10);
         assert_int_equal(o.summary.clamped, 6);
+        /* which layer it was, once */
+        const char *said = strstr(capture_log(), "layer 'albedo': 3 NaN or infinite samples in frame 1");
+        assert_non_null(said);
+        assert_null(strstr(said + 1, "layer 'albedo'"));
+        assert_non_null(strstr(capture_log(), "layer 'normal': 1 NaN or infinite sample in frame 1"));
+        assert_non_null(strstr(capture_log(), "layer 'depth': 1 NaN or infinite sample in frame 1"));
         sequence_leave(folder, s, 2);
     }
 }
@@ -191,5 +185,5 @@ int main(void)
         cmocka_unit_test(test_sizes_in_a_frame),    cmocka_unit_test(test_counts),
         cmocka_unit_test(test_ids_refused),
     };
-    return cmocka_run_group_tests(tests, setup, teardown);
+    return cmocka_run_group_tests(tests, capture_setup, capture_teardown);
 }

@@ -15,19 +15,6 @@
 #include "tests/capture_sequence.h"
 #include "tests/tool_run.h"
 
-static int setup(void **state)
-{
-    (void)state;
-    return capture_start() ? 0 : -1;
-}
-
-static int teardown(void **state)
-{
-    (void)state;
-    capture_stop();
-    return 0;
-}
-
 /* ---- cameras and frames ---- */
 
 static void test_a_camera_a_frame(void **state)
@@ -318,5 +305,5 @@ int main(void)
         cmocka_unit_test(test_command_line),
         cmocka_unit_test(test_two_captures),
     };
-    return cmocka_run_group_tests(tests, setup, teardown);
+    return cmocka_run_group_tests(tests, capture_setup, capture_teardown);
 }

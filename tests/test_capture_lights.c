@@ -23,13 +23,7 @@ static int setup(void **state)
     (void)state;
     if (!capture_start())
         return -1;
-    scene_camera c = scene_camera_default();
-    scene s = scene_make(&c, SCENE_LIGHTS, SCENE_KEY | SCENE_RIM);
-    folder = folder_new();
-    capture_write(folder, &plain, &s, 1);
-    capture_write(folder, &plain, &s, 2);
-    capture_manifest(folder, &plain, &s, 1);
-    scene_free(&s);
+    folder = capture_lit(&plain, 2);
     return 0;
 }
 
@@ -95,6 +89,9 @@ static void test_paths(void **state)
     } rows[] = {
         {{{"lights.rim.enabled", "false"}, {"lights.key.efficacy", "100"}}, 2, SCENE_LIGHTS & ~SCENE_RIM},
         {{{"lights.rim.enabled", "true"}}, 1, SCENE_LIGHTS},
+        {{{"lights.rim", "null"}}, 1, SCENE_LIGHTS & ~SCENE_RIM},
+        {{{"lights.key.efficacy", "100"}, {"lights.rim", "null"}}, 2, SCENE_LIGHTS & ~SCENE_RIM},
+        {{{"lights.rim.efficacy", "null"}}, 1, SCENE_LIGHTS},
         {{{"lights", "{}"}}, 1, 0}};
     static const char *const color[] = {"c.color"};
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
@@ -105,10 +102,62 @@ static void test_paths(void **state)
         scene s = truth(rows[i].lights, SCENE_KEY | SCENE_RIM);
         assert_int_equal(rl_session_process(r, 0, 1, NULL, &err), RL_OK);
         rl_image_view view = capture_image(r, "c.color");
-        assert_true(capture_error(&view, &s, SCENE_COLOR, 3, i < 2 ? 0 : 1) <= 4e-6);
+        assert_true(capture_error(&view, &s, SCENE_COLOR, 3, rows[i].lights ? 0 : 1) <= 4e-6);
         rl_session_close(&r);
         scene_free(&s);
     }
+}
+
+/* Removing what is not there is a slip as a rule, and no more than a slip. */
+static void test_removing_nothing(void **state)
+{
+    (void)state;
+    static const struct {
+        rl_setting setting;
+        const char *says;
+    } rows[] = {
+        {{"lights.rm", "null"},
+         "nothing is removed: the capture 'cap' has no light 'rm'; did you mean 'rim'?"},
+        {{"graph.lihgt", "null"},
+         "nothing is removed: there is no 'graph.lihgt'; did you mean 'light'? known: c, "
+         "light"},
+        {{"graph.light.shadow_steps", "null"}, "there is no 'graph.light.shadow_steps'; known: pass"},
+        {{"nothing.at.all", "null"}, "there is no 'nothing.at.all'; known: graph"},
+    };
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        const rl_options options = {.settings = &rows[i].setting, .n_settings = 1};
+        capture_log_clear();
+        rl_session *r = capture_open(folder, capture_pipeline, &options);
+        if (!strstr(capture_log(), rows[i].says))
+            print_error("%s\ninstead of\n%s\n", capture_log(), rows[i].says);
+        assert_non_null(strstr(capture_log(), rows[i].says));
+        rl_session_close(&r);
+    }
+    capture_log_clear();
+}
+
+/* Neither has any: a black picture is not what was meant. An empty map says that it is. */
+static void test_no_light(void **state)
+{
+    (void)state;
+    static const rl_setting none = {"lights", "{}"};
+    const capture_form f = {.name = "no lights", .no_lights = true};
+    scene s = truth(0, 0);
+    char *own = folder_new();
+    capture_write(own, &f, &s, 1);
+    capture_manifest(own, &f, &s, 1);
+    for (int i = 0; i < 2; i++) {
+        const rl_options options = {.settings = &none, .n_settings = (size_t)i};
+        capture_log_clear();
+        rl_session *r = capture_open(own, capture_pipeline, &options);
+        const char *said = strstr(capture_log(), "pass 'light' (lighting): there is no light: neither the "
+                                                 "pipeline nor the capture 'cap' has `lights:`");
+        assert_int_equal(said != NULL, i == 0);
+        rl_session_close(&r);
+    }
+    capture_log_clear();
+    scene_free(&s);
+    folder_remove(own);
 }
 
 /* ---- units ---- */
@@ -409,7 +458,8 @@ static void test_memory_without_name(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_paths),          cmocka_unit_test(test_photometric),
+        cmocka_unit_test(test_paths),          cmocka_unit_test(test_removing_nothing),
+        cmocka_unit_test(test_no_light),       cmocka_unit_test(test_photometric),
         cmocka_unit_test(test_sphere),         cmocka_unit_test(test_shadows),
         cmocka_unit_test(test_no_such_shadow), cmocka_unit_test(test_renamed_layers),
         cmocka_unit_test(test_camera_space),   cmocka_unit_test(test_working_space),

@@ -15,19 +15,6 @@
 #include "tests/capture_run.h"
 #include "tests/tool_run.h"
 
-static int setup(void **state)
-{
-    (void)state;
-    return capture_start() ? 0 : -1;
-}
-
-static int teardown(void **state)
-{
-    (void)state;
-    capture_stop();
-    return 0;
-}
-
 /* How far off a form may be: what its numbers lose, relative to the largest value of the image (normals:
  * absolute). */
 typedef struct allowed {
@@ -353,5 +340,5 @@ int main(void)
         cmocka_unit_test(test_units),   cmocka_unit_test(test_normals), cmocka_unit_test(test_cameras),
         cmocka_unit_test(test_motion),  cmocka_unit_test(test_ids),     cmocka_unit_test(test_albedo_spaces),
     };
-    return cmocka_run_group_tests(tests, setup, teardown);
+    return cmocka_run_group_tests(tests, capture_setup, capture_teardown);
 }

@@ -14,9 +14,6 @@
 #include "graph/base/alloc.h"
 #include "graph/run/experiment.h"
 #include "tests/small_capture.h"
-#include "tests/tool_run.h"
-
-static char *folder, *pipeline;
 
 #define GAUSSIANS "[{variance_mm2: 9, weight: [0.1, 0.3, 0.3]}, {variance_mm2: 90, weight: [0.5, 0.1, 0]}]"
 #define PASS(name)                                                                                           \
@@ -78,11 +75,10 @@ static rl_experiment *run_all(seen *s, bool energy)
     rl_variant variants[N];
     for (size_t i = 0; i < N; i++)
         variants[i] = (rl_variant){.name = changes[i].name,
-                                   .pipeline = pipeline,
+                                   .pipeline = small_pipe,
                                    .settings = changes[i].settings,
                                    .n_settings = changes[i].n};
-    char *out = path_in(folder, "out");
-    rl_options options = {.threads = 2, .energy = energy, .out = out};
+    rl_options options = {.threads = 2, .energy = energy, .out = small_out};
     rl_experiment_hooks hooks = {.frame = on_frame, .ctx = s};
     rl_run_summary summary;
     rl_error err = {0};
@@ -91,7 +87,6 @@ static rl_experiment *run_all(seen *s, bool energy)
         fail_msg("%s:%d: %s", err.file, err.line, err.text);
     assert_int_equal(summary.failed, 0);
     assert_int_equal(s->frames, SMALL_FRAMES);
-    free(out);
     return x;
 }
 
@@ -231,28 +226,11 @@ static void test_shared_nodes(void **state)
     rl_experiment_close(&x);
 }
 
-static int setup(void **state)
-{
-    (void)state;
-    folder = folder_new();
-    small_capture_write(folder);
-    pipeline = path_in(folder, "pipe.yaml");
-    return 0;
-}
-
-static int teardown(void **state)
-{
-    (void)state;
-    folder_remove(folder);
-    free(pipeline);
-    return 0;
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_pictures_and_rows),
         cmocka_unit_test(test_shared_nodes),
     };
-    return cmocka_run_group_tests(tests, setup, teardown);
+    return cmocka_run_group_tests(tests, small_setup, small_teardown);
 }

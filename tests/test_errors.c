@@ -90,10 +90,14 @@ static const row rows[] = {
     {"wrong type of a section", "profiles:\n", "shading: 5\nprofiles:\n", .at = "5\nprofiles", .says = {"shading", "a map"}},
     {"wrong word", "profile: skin", "profile: skin, diffuse: disny", .at = "disny", .says = {"did you mean 'disney'?"}},
     {"value of --set out of range", .arguments = {"--set", "graph.aa.blend=2"}, .says = {"--set graph.aa.blend", "blend", "2"}},
-    {"frames that are not listed", .arguments = {"--frames", "7-9"}, .says = {"9"}},
+    {"frames that are not listed", .arguments = {"--frames", "7-9"}, .says = {"frame 9 is not in the capture 'monkey', which lists 1-8"}},
     {"frames that are no spec", .arguments = {"--frames", "1..3"}, .says = {"1..3"}},
     {"not YAML", "relit: 1", "relit: [1", .says = {"pipe.yaml:"}},
     {"key twice", "relit: 1", "relit: 1\nrelit: 1", .at = "relit: 1\ncapture", .says = {"relit"}},
+    {"another pass's parameter", "pass: sss_burley", "pass: sss_gaussian", .at = "taps: 21", .says = {"has no parameter 'taps'; known: separable, weighting"}},
+    {"the beginning of a word", "profile: skin", "profile: skin, diffuse: lamb", .at = "lamb, rough", .says = {"did you mean 'lambert'?"}},
+    {"the beginning of a key", "roughness: 0.45", "rough: 0.45", .at = "rough:", .says = {"did you mean 'roughness'?"}},
+    {"an integer of more than 32 bits", "taps: 21", "seed: 4294967296", .at = "4294967296", .says = {"'seed': expected an integer of at most 2147483647 (32 bits)"}},
     {"no version", "relit: 1\n", "", .says = {"pipe.yaml:", "relit: 1"}},
     /* structure */
     {"cycle", "light: {pass: lighting}", "light: {pass: lighting, in: {albedo: aa.color}}", .says = {"pipe.yaml:", "light", "sss", "aa", "->"}},
@@ -104,13 +108,16 @@ static const row rows[] = {
     {"two outputs of one file", "frame:04}.png\"", "frame:04}.exr\"", .says = {"pipe.yaml:", "beauty", "view"}},
     /* captures */
     {"missing manifest", "capture: capture.yaml", "capture: gone.yaml", .says = {"gone.yaml"}},
+    {"a pipeline for a manifest", "capture: capture.yaml", "capture: pipe.yaml", .says = {"pipe.yaml: error: this is a pipeline, not the manifest of a capture"}},
     {"missing files", "monkey.####.exr", "gone.####.exr", true, .says = {"gone."}},
     {"missing channel", "normal.X, normal.Y", "nrm.X, normal.Y", true, .says = {"monkey.0001.exr", "layer 'normal'", "'nrm.X'", "normal.X"}},
     {"missing required layer", "  depth:     {channels: [depth.Z], kind: planar, empty: 1e10}\n", "", true, .says = {"depth"}},
     {"a material for a name that the capture lacks", "  default: {}", "  default: {}\n  marbel: {}", .at = "marbel", .says = {"marbel"}},
-    {"a stencil id without a material", "  default: {}\n", "", .says = {"id 2", "pixels"}, .status = 1},
+    {"a stencil id without a material", "  default: {}\n", "", .says = {"id 2 'plaster' (", " pixels), 3 'leaf' ("}, .status = 1},
     {"more memory than allowed", .arguments = {"--memory-limit", "1M"}, .says = {"memory"}},
-    {"a crop outside of the image", .arguments = {"--crop", "5000,0,10,10"}, .says = {"--crop 5000"}, .status = 1},
+    {"a crop outside of the image", .arguments = {"--crop", "5000,0,10,10"}, .says = {"error: --crop 5000,0,10,10 lies outside of the image, which is 0,0,480,270"}},
+    {"a layer in an unknown colour space", "colorspace: lin_rec709", "colorspace: lin_rec70", true, "lin_rec70}", .says = {"did you mean 'lin_rec709'?", "known: ACES2065-1"}},
+    {"depth that is empty everywhere", "empty: 1e10", "empty: 0", true, "0}\n", .says = {"'empty' is 0: out of range, above 0"}},
 };
 /* clang-format on */
 

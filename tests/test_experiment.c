@@ -16,8 +16,6 @@
 #include "tests/small_capture.h"
 #include "tests/tool_run.h"
 
-static char *folder, *pipeline;
-
 /* ---- variants -------------------------------------------------------------------------------------------
  */
 
@@ -57,7 +55,7 @@ static void fill_variants(rl_variant *variants)
 {
     for (size_t i = 0; i < N; i++)
         variants[i] = (rl_variant){.name = changes[i].name,
-                                   .pipeline = pipeline,
+                                   .pipeline = small_pipe,
                                    .settings = changes[i].settings,
                                    .n_settings = changes[i].n,
                                    .files = true};
@@ -76,7 +74,7 @@ static rl_experiment *open_all(const rl_options *options, const rl_variant *vari
 static void run_alone(const change *c, const char *out)
 {
     rl_options options = {
-        .pipeline = pipeline, .out = out, .threads = 2, .settings = c->settings, .n_settings = c->n};
+        .pipeline = small_pipe, .out = out, .threads = 2, .settings = c->settings, .n_settings = c->n};
     rl_error err = {0};
     rl_session *s = NULL;
     rl_run_summary summary;
@@ -160,7 +158,7 @@ static void test_same_as_alone(void **state)
     (void)state;
     static seen s;
     rl_variant variants[N];
-    char *together = path_in(folder, "together");
+    char *together = path_in(small_folder, "together");
     rl_options options = {.out = together, .threads = 2};
     rl_error err = {0};
     rl_run_summary summary;
@@ -177,7 +175,7 @@ static void test_same_as_alone(void **state)
     assert_true(cost.measured && cost.factor > 1 && cost.factor < cost.sum);
     rl_experiment_close(&s.x);
     for (size_t i = 0; i < N; i++) {
-        char *own = path_in(together, changes[i].name), *alone = path_in(folder, "alone");
+        char *own = path_in(together, changes[i].name), *alone = path_in(small_folder, "alone");
         run_alone(&changes[i], alone);
         for (int frame = 1; frame <= SMALL_FRAMES; frame++) {
             static const char *const before[] = {"", "", "aov/"}, *const behind[] = {"exr", "png", "exr"};
@@ -240,9 +238,9 @@ static void test_predicted_cost(void **state)
 {
     (void)state;
     rl_variant variants[3] = {
-        {.name = "a", .pipeline = pipeline},
-        {.name = "b", .pipeline = pipeline},
-        {.name = "c", .pipeline = pipeline, .settings = changes[2].settings, .n_settings = 1}};
+        {.name = "a", .pipeline = small_pipe},
+        {.name = "b", .pipeline = small_pipe},
+        {.name = "c", .pipeline = small_pipe, .settings = changes[2].settings, .n_settings = 1}};
     rl_options options = {.threads = 1};
     rl_experiment_cost cost;
     rl_experiment *x = open_all(&options, variants, 2);
@@ -260,8 +258,8 @@ static void test_refusals(void **state)
 {
     (void)state;
     rl_setting bad = {"graph.sss.tapps", "3"}, frame = {"capture", "nowhere.yaml"};
-    rl_variant variants[2] = {{.name = "good", .pipeline = pipeline},
-                              {.name = "bad", .pipeline = pipeline, .settings = &bad, .n_settings = 1}};
+    rl_variant variants[2] = {{.name = "good", .pipeline = small_pipe},
+                              {.name = "bad", .pipeline = small_pipe, .settings = &bad, .n_settings = 1}};
     rl_options options = {.threads = 1}, shard = {.threads = 1, .shard = {1, 2}},
                small = {.memory_limit = 100000};
     rl_error err = {0};
@@ -310,23 +308,6 @@ static void test_missing_frame(void **state)
     free(b);
 }
 
-static int setup(void **state)
-{
-    (void)state;
-    folder = folder_new();
-    small_capture_write(folder);
-    pipeline = path_in(folder, "pipe.yaml");
-    return 0;
-}
-
-static int teardown(void **state)
-{
-    (void)state;
-    folder_remove(folder);
-    free(pipeline);
-    return 0;
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -334,5 +315,5 @@ int main(void)
         cmocka_unit_test(test_predicted_cost), cmocka_unit_test(test_refusals),
         cmocka_unit_test(test_missing_frame),
     };
-    return cmocka_run_group_tests(tests, setup, teardown);
+    return cmocka_run_group_tests(tests, small_setup, small_teardown);
 }

@@ -14,14 +14,6 @@
 #include "graph/base/file.h"
 #include "tests/exr_make.h"
 
-static rl_pool *pools[3]; /* 1, 2, 4 threads */
-
-static void good(rl_code code, const rl_error *err)
-{
-    if (code)
-        fail_msg("%s: %s: %s", rl_code_name(code), err->file, err->text);
-}
-
 /* ---- round trips ---- */
 
 enum { RED, GREEN, BLUE, ALPHA, DEPTH, NOISE, ID, CHANNELS };
@@ -81,7 +73,7 @@ static void picture_write(const picture *p, const char *path, rl_exr_box data, r
                           .n_channels = CHANNELS,
                           .compression = compression,
                           .level = level};
-    good(rl_exr_write(path, &image, pool, &clamped, &err), &err);
+    made_good(rl_exr_write(path, &image, pool, &clamped, &err), &err);
     assert_int_equal(clamped, 0);
 }
 
@@ -90,13 +82,13 @@ static void picture_read(picture *p, const char *path, rl_pool *pool)
     rl_exr_plane planes[CHANNELS];
     rl_error err = {0};
     rl_exr *file;
-    good(rl_exr_open(path, 0, &file, &err), &err);
+    made_good(rl_exr_open(path, 0, &file, &err), &err);
     for (int c = 0; c < CHANNELS; c++)
         planes[c] = (rl_exr_plane){.channel = names[c],
                                    .floats = c == ID ? NULL : p->floats[c],
                                    .ids = c == ID ? p->ids : NULL,
                                    .stride = p->stride};
-    good(rl_exr_read(file, 0, planes, CHANNELS, NULL, pool, &err), &err);
+    made_good(rl_exr_read(file, 0, planes, CHANNELS, NULL, pool, &err), &err);
     for (int c = 0; c < CHANNELS; c++)
         assert_int_equal(planes[c].nonfinite, 0);
     rl_exr_close(&file);
@@ -157,8 +149,8 @@ static void round_trips(void **state)
             memset(in.ids, 0, in.stride * (size_t)h * 4);
             for (size_t y = 0; y < (size_t)h; y++) /* a pad that is 0 in both */
                 memset(out.ids + y * out.stride + (size_t)w, 0, 4 * (out.stride - (size_t)w));
-            picture_write(&out, made_path("trip.exr"), data, (rl_exr_compression)c, 0, pools[1]);
-            picture_read(&in, made_path("trip.exr"), pools[1]);
+            picture_write(&out, made_path("trip.exr"), data, (rl_exr_compression)c, 0, made_pools[1]);
+            picture_read(&in, made_path("trip.exr"), made_pools[1]);
             same_pictures(&out, &in, (rl_exr_compression)c);
             picture_free(&out);
             picture_free(&in);
@@ -179,8 +171,8 @@ static void core_reads_the_same(void **state)
         rl_exr_compression compression = c > RL_EXR_B44A ? RL_EXR_ZIP : (rl_exr_compression)c;
         const char *path = made_path("core.exr");
         picture_write(&out, path, (rl_exr_box){-5, 9, w - 6, h + 8}, compression,
-                      c > RL_EXR_B44A ? 1 + 8 * (c & 1) : 0, pools[1]);
-        picture_read(&in, path, pools[1]);
+                      c > RL_EXR_B44A ? 1 + 8 * (c & 1) : 0, made_pools[1]);
+        picture_read(&in, path, made_pools[1]);
         for (int k = 0; k < CHANNELS; k++) {
             made_read(path, 0, names[k], raw);
             for (int y = 0; y < h; y++) {
@@ -213,8 +205,8 @@ static void threads_change_nothing(void **state)
             size_t n;
             rl_error err = {0};
             picture_write(&out, made_path("threads.exr"), (rl_exr_box){0, 0, w - 1, h - 1},
-                          (rl_exr_compression)c, 0, pools[t]);
-            good(rl_file_read(made_path("threads.exr"), &bytes, &n, &err), &err);
+                          (rl_exr_compression)c, 0, made_pools[t]);
+            made_good(rl_file_read(made_path("threads.exr"), &bytes, &n, &err), &err);
             if (first) {
                 assert_int_equal(n, size);
                 assert_memory_equal(bytes, first, size);
@@ -224,7 +216,7 @@ static void threads_change_nothing(void **state)
                 size = n;
             }
             in[t] = picture_make(w, h);
-            picture_read(&in[t], made_path("threads.exr"), pools[t]);
+            picture_read(&in[t], made_path("threads.exr"), made_pools[t]);
             for (int k = 0; k < CHANNELS; k++)
                 assert_memory_equal(in[t].floats[k], in[0].floats[k], in[t].stride * (size_t)h * 4);
         }
@@ -251,11 +243,11 @@ static void clamping_is_counted(void **state)
         rl_error err = {0};
         uint64_t clamped = 0;
         rl_exr *file;
-        good(rl_exr_write(made_path("clamp.exr"), &image, pools[2], &clamped, &err), &err);
+        made_good(rl_exr_write(made_path("clamp.exr"), &image, made_pools[2], &clamped, &err), &err);
         assert_int_equal(clamped, 16);
-        good(rl_exr_open(made_path("clamp.exr"), 0, &file, &err), &err);
+        made_good(rl_exr_open(made_path("clamp.exr"), 0, &file, &err), &err);
         rl_exr_plane plane = {.channel = "Y", .floats = back, .stride = 2};
-        good(rl_exr_read(file, 0, &plane, 1, NULL, NULL, &err), &err);
+        made_good(rl_exr_read(file, 0, &plane, 1, NULL, NULL, &err), &err);
         rl_exr_close(&file);
         assert_int_equal(plane.nonfinite, 0);
         for (int i = 0; i < 80; i++)
@@ -285,14 +277,14 @@ static void noise_is_stored_plain(void **state)
             rl_exr *file;
             char *bytes;
             size_t size;
-            good(rl_exr_write(made_path("noise.exr"), &image, pools[1], NULL, &err), &err);
-            good(rl_file_read(made_path("noise.exr"), &bytes, &size, &err), &err);
+            made_good(rl_exr_write(made_path("noise.exr"), &image, made_pools[1], NULL, &err), &err);
+            made_good(rl_file_read(made_path("noise.exr"), &bytes, &size, &err), &err);
             rl_free(bytes);
             assert_in_range(size, sizeof noise, sizeof noise + 400 + 16 * H);
-            good(rl_exr_open(made_path("noise.exr"), 0, &file, &err), &err);
+            made_good(rl_exr_open(made_path("noise.exr"), 0, &file, &err), &err);
             memset(back, 0, sizeof back);
             rl_exr_plane plane = {.channel = "id", .ids = back, .stride = W};
-            good(rl_exr_read(file, 0, &plane, 1, NULL, pools[1], &err), &err);
+            made_good(rl_exr_read(file, 0, &plane, 1, NULL, made_pools[1], &err), &err);
             rl_exr_close(&file);
             assert_memory_equal(back, noise, sizeof noise);
             if (c == RL_EXR_B44 ||
@@ -305,24 +297,6 @@ static void noise_is_stored_plain(void **state)
     }
 }
 
-static int setup(void **state)
-{
-    (void)state;
-    rl_error err = {0};
-    for (int i = 0; i < 3; i++)
-        good(rl_pool_new(1 << i, &pools[i], &err), &err);
-    return 0;
-}
-
-static int teardown(void **state)
-{
-    (void)state;
-    for (int i = 0; i < 3; i++)
-        rl_pool_free(&pools[i]);
-    made_clean();
-    return 0;
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -332,5 +306,5 @@ int main(void)
         cmocka_unit_test(clamping_is_counted),
         cmocka_unit_test(noise_is_stored_plain),
     };
-    return cmocka_run_group_tests(tests, setup, teardown);
+    return cmocka_run_group_tests(tests, made_setup, made_teardown);
 }

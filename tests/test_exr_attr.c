@@ -12,12 +12,6 @@
 
 static const float pixel[4] = {1, 2, 3, 4};
 
-static void good(rl_code code, const rl_error *err)
-{
-    if (code)
-        fail_msg("%s: %s: %s", rl_code_name(code), err->file, err->text);
-}
-
 static const rl_exr_source source = {"Y", RL_EXR_FLOAT, pixel, NULL, 2};
 
 static rl_exr_image image_with(const rl_exr_attribute *attrs, size_t n)
@@ -67,7 +61,7 @@ static rl_exr *open_file(const char *path)
 {
     rl_exr *file;
     rl_error err = {0};
-    good(rl_exr_open(path, 0, &file, &err), &err);
+    made_good(rl_exr_open(path, 0, &file, &err), &err);
     return file;
 }
 
@@ -76,7 +70,7 @@ static void round_trip(void **state)
     (void)state;
     rl_error err = {0};
     rl_exr_image image = image_with(all, ALL);
-    good(rl_exr_write(made_path("attr.exr"), &image, NULL, NULL, &err), &err);
+    made_good(rl_exr_write(made_path("attr.exr"), &image, NULL, NULL, &err), &err);
     rl_exr *file = open_file(made_path("attr.exr"));
     for (int i = 0; i < ALL; i++) {
         rl_exr_value v;
@@ -119,7 +113,7 @@ static void printed(void **state)
                                           {"lineOrder", "lineOrder", "increasing y"}};
     rl_error err = {0};
     rl_exr_image image = image_with(all, ALL);
-    good(rl_exr_write(made_path("print.exr"), &image, NULL, NULL, &err), &err);
+    made_good(rl_exr_write(made_path("print.exr"), &image, NULL, NULL, &err), &err);
     rl_exr *file = open_file(made_path("print.exr"));
     size_t found = 0;
     for (size_t i = 0; i < rl_exr_part_at(file, 0)->n_attrs; i++) {
@@ -147,7 +141,7 @@ static void copied(void **state)
     (void)state;
     rl_error err = {0};
     rl_exr_image image = image_with(all, ALL);
-    good(rl_exr_write(made_path("from.exr"), &image, NULL, NULL, &err), &err);
+    made_good(rl_exr_write(made_path("from.exr"), &image, NULL, NULL, &err), &err);
     rl_exr *from = open_file(made_path("from.exr"));
     static const char *const names[] = {"camera:*", "worldToCamera", "timeCode", "owner",
                                         "missing",  "dataWindow",    "comp*",    "framesPerSecond"};
@@ -158,7 +152,7 @@ static void copied(void **state)
     copy.copy_from = from;
     copy.copy = names;
     copy.n_copy = sizeof names / sizeof *names;
-    good(rl_exr_write(made_path("to.exr"), &copy, NULL, NULL, &err), &err);
+    made_good(rl_exr_write(made_path("to.exr"), &copy, NULL, NULL, &err), &err);
     rl_exr *to = open_file(made_path("to.exr"));
     for (int i = 0; i < ALL; i++) {
         const char *name = all[i].name;
@@ -210,7 +204,7 @@ static void copied_as_they_are(void **state)
     image.copy_from = from;
     image.copy = every;
     image.n_copy = 1;
-    good(rl_exr_write(made_path("odd2.exr"), &image, NULL, NULL, &err), &err);
+    made_good(rl_exr_write(made_path("odd2.exr"), &image, NULL, NULL, &err), &err);
     rl_exr_close(&from);
     const char *strings[2], *type;
     const float *numbers;

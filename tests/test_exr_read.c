@@ -14,14 +14,6 @@
 #include "graph/run/shim_exr.h"
 #include "tests/exr_make.h"
 
-static rl_pool *pools[3]; /* 1, 2, 4 threads */
-
-static void good(rl_code code, const rl_error *err)
-{
-    if (code)
-        fail_msg("%s: %s: %s", rl_code_name(code), err->file, err->text);
-}
-
 /* ---- layouts that we do not write ---- */
 
 typedef struct seen {
@@ -81,7 +73,8 @@ static void read_tiles(const rl_exr *file, int part)
                                  {.channel = "b", .floats = &b[0][0], .stride = TILES_W},
                                  {.channel = "a", .floats = &a[0][0], .stride = TILES_W}};
         seen s = {.plane = &planes[2], .part = part, .width = TILES_W, .mutex = PTHREAD_MUTEX_INITIALIZER};
-        good(rl_exr_read(file, part, planes, 3, &(rl_exr_rows){count_rows, &s}, pools[t], &err), &err);
+        made_good(rl_exr_read(file, part, planes, 3, &(rl_exr_rows){count_rows, &s}, made_pools[t], &err),
+                  &err);
         assert_memory_equal(a, tiles_a, sizeof a);
         assert_memory_equal(ids, tiles_id, sizeof ids);
         for (int y = 0; y < TILES_H; y++) {
@@ -108,7 +101,7 @@ static void tiled_and_multipart(void **state)
         made_write(made_path("parts.exr"), parts, 2);
         rl_exr *file;
         rl_error err = {0};
-        good(rl_exr_open(made_path("parts.exr"), 1 << 20, &file, &err), &err);
+        made_good(rl_exr_open(made_path("parts.exr"), 1 << 20, &file, &err), &err);
         assert_int_equal(rl_exr_parts(file), 2);
         assert_int_equal(rl_exr_part_named(file, "data"), 1);
         assert_int_equal(rl_exr_part_named(file, "nothing"), -1);
@@ -181,7 +174,7 @@ static void tiled_dwa(void **state)
     assert_true(packed_tiles > 4);
     rl_exr *file;
     rl_error err = {0};
-    good(rl_exr_open(made_path("dwa.exr"), 1 << 20, &file, &err), &err);
+    made_good(rl_exr_open(made_path("dwa.exr"), 1 << 20, &file, &err), &err);
     read_tiles(file, 0);
     rl_exr_close(&file);
 }
@@ -205,10 +198,10 @@ static void one_channel_twice(void **state)
         rl_error err = {0};
         static uint32_t ids[H * W];
         static float floats[H * W];
-        good(rl_exr_open(made_path("twice.exr"), 0, &file, &err), &err);
+        made_good(rl_exr_open(made_path("twice.exr"), 0, &file, &err), &err);
         rl_exr_plane planes[] = {{.channel = "id", .ids = ids, .stride = W},
                                  {.channel = "id", .floats = floats, .stride = W}};
-        good(rl_exr_read(file, 0, planes, 2, NULL, NULL, &err), &err);
+        made_good(rl_exr_read(file, 0, planes, 2, NULL, NULL, &err), &err);
         assert_memory_equal(ids, id, sizeof id);
         for (int i = 0; i < W * H; i++)
             assert_true(floats[i] == (float)(i * 7));
@@ -238,7 +231,7 @@ static void nonfinite_values(void **state)
     }
     rl_exr *file;
     rl_error err = {0};
-    good(rl_exr_open(made_path("nan.exr"), 0, &file, &err), &err);
+    made_good(rl_exr_open(made_path("nan.exr"), 0, &file, &err), &err);
     for (int t = 0; t < 3; t++) {
         static float out[3][H * W];
         rl_exr_plane planes[] = {{.channel = "f", .floats = out[0], .stride = W},
@@ -246,7 +239,7 @@ static void nonfinite_values(void **state)
                                  {.channel = "h", .floats = out[2], .stride = W}};
         planes[2].replace_inf = true;
         planes[2].inf_value = 1e10f;
-        good(rl_exr_read(file, 0, planes, 3, NULL, pools[t], &err), &err);
+        made_good(rl_exr_read(file, 0, planes, 3, NULL, made_pools[t], &err), &err);
         assert_int_equal(planes[0].nonfinite, bad);
         assert_int_equal(planes[1].nonfinite, bad);
         assert_int_equal(planes[2].nonfinite, bad - inf);
@@ -272,10 +265,10 @@ static rl_code read_value(rl_exr_pixel type, const void *value, bool as_id, uint
     made_write(made_path("value.exr"), &part, 1);
     rl_exr *file;
     *err = (rl_error){0};
-    good(rl_exr_open(made_path("value.exr"), 0, &file, err), err);
+    made_good(rl_exr_open(made_path("value.exr"), 0, &file, err), err);
     rl_exr_plane plane = {
         .channel = "v", .floats = as_id ? NULL : floats, .ids = as_id ? ids : NULL, .stride = 4};
-    rl_code code = rl_exr_read(file, 0, &plane, 1, NULL, pools[1], err);
+    rl_code code = rl_exr_read(file, 0, &plane, 1, NULL, made_pools[1], err);
     rl_exr_close(&file);
     *id = ids[6];
     *number = floats[6];
@@ -312,15 +305,15 @@ static void ids_are_integers(void **state)
             assert_non_null(strstr(err.text, "'v'"));
     }
     uint16_t half = made_half(2048), bad = made_half(0.5f);
-    good(read_value(RL_EXR_HALF, &half, true, &id, &number, &err), &err);
+    made_good(read_value(RL_EXR_HALF, &half, true, &id, &number, &err), &err);
     assert_int_equal(id, 2048);
     assert_int_equal(read_value(RL_EXR_HALF, &bad, true, &id, &number, &err), RL_E_DATA);
     assert_non_null(strstr(err.text, "0.5 at pixel (12, 21)"));
     assert_non_null(strstr(err.file, "value.exr"));
     uint32_t exact = 0x01000000, odd = 0x01000001, most = 0xffffffff;
-    good(read_value(RL_EXR_UINT, &most, true, &id, &number, &err), &err);
+    made_good(read_value(RL_EXR_UINT, &most, true, &id, &number, &err), &err);
     assert_int_equal(id, 0xffffffff);
-    good(read_value(RL_EXR_UINT, &exact, false, &id, &number, &err), &err);
+    made_good(read_value(RL_EXR_UINT, &exact, false, &id, &number, &err), &err);
     assert_true(number == 16777216.0f);
     assert_int_equal(read_value(RL_EXR_UINT, &odd, false, &id, &number, &err), RL_E_DATA);
     assert_non_null(strstr(err.text, "16777217 at pixel (12, 21)"));
@@ -340,35 +333,17 @@ static void limits(void **state)
     assert_int_equal(rl_exr_open(made_path("limit.exr"), plane - 1, &file, &err), RL_E_MEMORY);
     assert_null(file);
     err = (rl_error){0};
-    good(rl_exr_open(made_path("limit.exr"), plane, &file, &err), &err);
+    made_good(rl_exr_open(made_path("limit.exr"), plane, &file, &err), &err);
     static float a[TILES_H][TILES_W];
     rl_exr_plane one = {.channel = "a", .floats = &a[0][0], .stride = TILES_W};
     assert_int_equal(rl_exr_read(file, 0, &one, 1, NULL, NULL, &err), RL_E_MEMORY);
     assert_non_null(strstr(err.text, "limit"));
     rl_exr_close(&file);
     err = (rl_error){0};
-    good(rl_exr_open(made_path("limit.exr"), plane * 6, &file, &err), &err);
-    good(rl_exr_read(file, 0, &one, 1, NULL, NULL, &err), &err);
+    made_good(rl_exr_open(made_path("limit.exr"), plane * 6, &file, &err), &err);
+    made_good(rl_exr_read(file, 0, &one, 1, NULL, NULL, &err), &err);
     assert_memory_equal(a, tiles_a, sizeof a);
     rl_exr_close(&file);
-}
-
-static int setup(void **state)
-{
-    (void)state;
-    rl_error err = {0};
-    for (int i = 0; i < 3; i++)
-        good(rl_pool_new(1 << i, &pools[i], &err), &err);
-    return 0;
-}
-
-static int teardown(void **state)
-{
-    (void)state;
-    for (int i = 0; i < 3; i++)
-        rl_pool_free(&pools[i]);
-    made_clean();
-    return 0;
 }
 
 int main(void)
@@ -378,5 +353,5 @@ int main(void)
         cmocka_unit_test(one_channel_twice),   cmocka_unit_test(nonfinite_values),
         cmocka_unit_test(ids_are_integers),    cmocka_unit_test(limits),
     };
-    return cmocka_run_group_tests(tests, setup, teardown);
+    return cmocka_run_group_tests(tests, made_setup, made_teardown);
 }

@@ -104,9 +104,9 @@ static void test_find_and_check(void **state)
     assert_int_equal(rl_frames_find(&listed, 20), 5);
     assert_int_equal(rl_frames_find(&listed, 4), -1);
     assert_int_equal(rl_frames_find(&none, 4), -1);
-    assert_int_equal(rl_frames_check(&listed, &some, RL_NOWHERE, &err), RL_OK);
-    assert_int_equal(rl_frames_check(&listed, &wrong, RL_NOWHERE, &err), RL_E_USAGE);
-    assert_string_equal(err.text, "frame 4 is not in the capture, which lists 1-9x2,20");
+    assert_int_equal(rl_frames_check(&listed, "shot", &some, RL_NOWHERE, &err), RL_OK);
+    assert_int_equal(rl_frames_check(&listed, "shot", &wrong, RL_NOWHERE, &err), RL_E_USAGE);
+    assert_string_equal(err.text, "frame 4 is not in the capture 'shot', which lists 1-9x2,20");
 }
 
 int main(void)

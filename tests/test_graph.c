@@ -166,6 +166,21 @@ static void binds_planes_of_lights(void **state)
     assert_string_equal(on_port(g, 0, "thickness", RL_READ), "-"); /* a layer without planes is absent */
 }
 
+/* `in: {shadow: none}` leaves an optional layer out that the capture has. */
+static void leaves_inputs_out(void **state)
+{
+    fixture *f = *state;
+    const rl_graph *g = NULL;
+    const rl_node dark = {"light", AT(1), &light, NULL, INPUTS({"shadow", "none", AT(2)})};
+    assert_int_equal(rl_graph_build(&f->arena, &dark, 1, with_shadow, 4, NULL, 0, &g, &f->err), RL_OK);
+    assert_string_equal(on_port(g, 0, "shadow", RL_READ), "-");
+    assert_string_equal(on_port(g, 0, "albedo", RL_READ), "capture.albedo");
+    const rl_node needed = {"light", AT(1), &light, NULL, INPUTS({"depth", "none", AT(2)})};
+    expect_error(
+        f, &needed, 1, 2,
+        "pass 'light' (lighting): port 'depth' needs an image (scalar): only optional ones can be 'none'");
+}
+
 static void names_what_is_unknown(void **state)
 {
     fixture *f = *state;
@@ -348,10 +363,9 @@ static void survives_failing_memory(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        TEST(binds_inputs),          TEST(binds_planes_of_lights),
-        TEST(names_what_is_unknown), TEST(refuses_what_does_not_fit),
-        TEST(prints_cycles_whole),   TEST(converts_outputs),
-        TEST(takes_long_chains),     TEST(survives_failing_memory),
+        TEST(binds_inputs),          TEST(binds_planes_of_lights),    TEST(leaves_inputs_out),
+        TEST(names_what_is_unknown), TEST(refuses_what_does_not_fit), TEST(prints_cycles_whole),
+        TEST(converts_outputs),      TEST(takes_long_chains),         TEST(survives_failing_memory),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -22,12 +22,7 @@ static int setup(void **state)
     (void)state;
     if (!capture_start())
         return -1;
-    scene_camera c = scene_camera_default();
-    scene s = scene_make(&c, SCENE_LIGHTS, SCENE_KEY | SCENE_RIM);
-    folder = folder_new();
-    capture_write(folder, &plain, &s, 1);
-    capture_manifest(folder, &plain, &s, 1);
-    scene_free(&s);
+    folder = capture_lit(&plain, 1);
     return 0;
 }
 

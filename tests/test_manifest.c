@@ -571,8 +571,8 @@ static void test_bad_lights(void **state)
         {"{type: directional, direction: [0, 0, 0], lux: 1}", "light 'k': 'direction' has no usable length"},
         {"{type: spot, position: [0, 0, 0], direction: [0, 0, 1], intensity: 1}",
          "light 'k': a spot light needs 'angle' (full, degrees)"},
-        {"{type: spot, position: [0, 0, 0], direction: [0, 0, 1], angle: 180, intensity: 1}",
-         "'angle' is 180: out of range, 0.01 to 179.9"},
+        {"{type: spot, position: [0, 0, 0], direction: [0, 0, 1], angle: 180.5, intensity: 1}",
+         "'angle' is 180.5: out of range, 0.01 to 180"},
         {"{type: point, positon: [0, 0, 0]}",
          "light 'k' has no key 'positon'; did you mean 'position'? "
          "known: angle, blend, candela, color, colorspace, "

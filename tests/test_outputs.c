@@ -89,6 +89,7 @@ static void test_single_letters(void **state)
         {"c.color", "A:half B:half G:half R:half"}, {"capture.normal", "X:half Y:half Z:half"},
         {"capture.motion", "X:half Y:half"},        {"capture.depth", "V:half"},
         {"capture.shadow.rim", "V:half"},           {"capture.stencil", "ID:uint"},
+        {"capture.shadow", "key:half rim:half"}, /* a plane a light, which have names */
     };
     (void)state;
     rl_str text = {0};

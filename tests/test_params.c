@@ -3,6 +3,7 @@
 #include "tests/config_help.h"
 
 #include <math.h>
+#include <float.h>
 #include <string.h>
 
 #include "graph/base/alloc.h"
@@ -112,6 +113,12 @@ static void test_types(void **state)
     refuse_row("tint", "~",
                "t.yaml:1:1: error: 'tint': expected a number or a list of three, each 0 … 1 (ratio), "
                "found null");
+    static const rl_param free_row = {
+        .name = "shift", .type = RL_RGBF, .min = (double)-FLT_MAX, .max = (double)FLT_MAX, .help = "any"};
+    float out[3];
+    assert_int_equal(rl_param_read(&free_row, config_parse("x"), out, &config_error), RL_E_CONFIG);
+    config_assert_error(
+        "t.yaml:1:1: error: 'shift': expected a number or a list of three, found the text 'x'");
 }
 
 /* ---- a pass's struct

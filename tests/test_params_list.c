@@ -92,6 +92,21 @@ static void test_sums(void **state)
            "t.yaml:1:1: error: 'lobes': 'width' adds up to 16, at most 10 is allowed");
 }
 
+/* An element that comes from elsewhere than its list is the one to look at. */
+static void test_sums_place(void **state)
+{
+    (void)state;
+    rl_value *root = config_parse("lobes: [{width: 2, share: 0.6}, {width: 2, share: 0.3}]"), *v = NULL;
+    lobes_value out;
+    config_assert_fine(
+        rl_yaml_parse(&config_arena, "[0, 0.5, 0]", 11, "--set lobes.1.share", &v, &config_error));
+    config_assert_fine(rl_value_set(&config_arena, &root, "lobes.1.share", v, &config_error));
+    assert_int_equal(rl_param_read(&lobes, rl_value_get(root, "lobes"), &out, &config_error), RL_E_CONFIG);
+    config_assert_error(
+        "--set lobes.1.share:1:1: error: 'lobes': 'share' adds up to [0.6, 1.1, 0.6], at most 1 a "
+        "channel is allowed");
+}
+
 static void test_telling(void **state)
 {
     (void)state;
@@ -192,6 +207,29 @@ static void test_required(void **state)
         resolve("profiles: {a: {mode: none}}\nmaterials: {skin: {profile: a, stencil: 1}}", &both[1], 1, &m));
 }
 
+/* What a list adds up to is the business of the passes that read it. */
+static void test_sums_unread(void **state)
+{
+    (void)state;
+    static const rl_param before_keys[] = {M(RL_F32, before, 0, 1, 0.5, "", "a field in front")};
+    static const rl_pass other = {.name = "other", .profile_keys = RL_ARRAY(before_keys)};
+    static const rl_pass *const unread[] = {&other};
+    static const char text[] = "profiles: {a: {lobes: [{width: 2, share: 0.9}, {width: 2, share: 0.9}]}}\n"
+                               "materials: {skin: {profile: a, stencil: 1}}";
+    const rl_materials *m;
+    config_assert_fine(resolve(text, unread, 1, &m));
+    assert_int_equal(resolve(text, both, 1, &m), RL_E_CONFIG);
+    config_assert_error(
+        "t.yaml:1:23: error: 'lobes': 'share' adds up to [1.8, 1.8, 1.8], at most 1 a channel is "
+        "allowed");
+    assert_int_equal(
+        resolve("profiles: {a: {lobes: [{width: 2, share: 1.5}]}}\nmaterials: {skin: {profile: a, "
+                "stencil: 1}}",
+                unread, 1, &m),
+        RL_E_CONFIG); /* ranges are checked all the same */
+    config_error = (rl_error){0};
+}
+
 static void test_set(void **state)
 {
     (void)state;
@@ -263,8 +301,9 @@ static void test_steps(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        T(test_reading),  T(test_refusing), T(test_sums),  T(test_telling),       T(test_table),
-        T(test_required), T(test_set),      T(test_steps), T(test_out_of_memory),
+        T(test_reading),     T(test_refusing), T(test_sums),          T(test_sums_place),
+        T(test_sums_unread), T(test_telling),  T(test_table),         T(test_required),
+        T(test_set),         T(test_steps),    T(test_out_of_memory),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

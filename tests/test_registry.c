@@ -187,10 +187,40 @@ static bool has_reduction(const rl_pass *p, const char *name)
     return false;
 }
 
+static bool has_word(const char *words, const char *word, size_t length)
+{
+    for (; words; words = strchr(words, '|') ? strchr(words, '|') + 1 : NULL)
+        if (strcspn(words, "|") == length && !strncmp(words, word, length))
+            return true;
+    return false;
+}
+
+/* "KEY: a|b" is of a profile key and of words that it has; the port instead of it is one that is read. */
+static void check_missed(const rl_pass *p, const rl_port *port)
+{
+    bool key = false, instead = !port->instead;
+    size_t n = strcspn(port->missed_by, ":");
+    assert_true(port->role == RL_READ && port->optional);
+    check_help(p->name, port->name, port->if_missed);
+    for (size_t i = 0; i < p->ports.n && port->instead; i++)
+        instead |= p->ports.rows[i].role == RL_READ && !strcmp(p->ports.rows[i].name, port->instead);
+    for (size_t i = 0; i < p->profile_keys.n; i++) {
+        const rl_param *row = &p->profile_keys.rows[i];
+        if (strncmp(row->name, port->missed_by, n) || row->name[n])
+            continue;
+        key = true;
+        for (const char *w = port->missed_by + n + 2; w; w = strchr(w, '|') ? strchr(w, '|') + 1 : NULL)
+            assert_true(has_word(row->words, w, strcspn(w, "|")));
+    }
+    assert_true(key && instead);
+}
+
 static void check_port(const rl_pass *p, size_t which)
 {
     const rl_port *a = &p->ports.rows[which];
     check_help(p->name, a->name, a->help);
+    if (a->missed_by)
+        check_missed(p, a);
     assert_true(strspn(a->name, "abcdefghijklmnopqrstuvwxyz0123456789_") == strlen(a->name));
     assert_true((a->of != NULL) == (a->role == RL_HISTORY));
     if (a->of) {

@@ -154,21 +154,8 @@ static void test_truth(void **state)
     scene_free(&s);
 }
 
-static int begin(void **state)
-{
-    (void)state;
-    return capture_start() ? 0 : -1;
-}
-
-static int end(void **state)
-{
-    (void)state;
-    capture_stop();
-    return 0;
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_truth)};
-    return cmocka_run_group_tests(tests, begin, end);
+    return cmocka_run_group_tests(tests, capture_setup, capture_teardown);
 }

@@ -27,6 +27,7 @@ static const double distance_mm[3] = {2, 1, 0.5};
 static const double to_light[3] = {0.8, 0.2, 0.5656854249492381};
 
 typedef enum shape { BALL, CYLINDER, WAVES } shape;
+static const char *const words[] = {"area", "plain", "surface"};
 static const char *const shape_names[] = {"ball", "cylinder", "waves"};
 static const double radius = 14; /* mm, of ball and cylinder */
 
@@ -79,13 +80,12 @@ static bool seen(shape s, int x, int y, double *height, double *light)
 
 /* ---- the truth ---- */
 
-/* By Archimedes the ring of the ball at chords r … r+dr has the area 2 pi r dr; E over it, by its angle. */
-static double ball_integral(double u, double v, double d)
+/* At the ball's point with normal n. By Archimedes the ring of the ball at chords r … r+dr has the area 2 pi
+ * r dr; E over it, by its angle. */
+static double ball_integral(const double n[3], double d)
 {
     const int rings = 300, turns = 96;
-    double n[3] = {u / radius, -v / radius, 0}, sum = 0;
-    n[2] = sqrt(1 - n[0] * n[0] - n[1] * n[1]);
-    double flat = sqrt(n[0] * n[0] + n[1] * n[1]) + 1e-12, a[3] = {-n[1] / flat, n[0] / flat, 0};
+    double sum = 0, flat = sqrt(n[0] * n[0] + n[1] * n[1]) + 1e-12, a[3] = {-n[1] / flat, n[0] / flat, 0};
     double b[3] = {n[1] * a[2] - n[2] * a[1], n[2] * a[0] - n[0] * a[2], n[0] * a[1] - n[1] * a[0]};
     double all = rl_burley_cdf(2 * radius, d);
     for (int i = 0; i < rings; i++) {
@@ -132,7 +132,8 @@ static double curve_integral(shape s, double at, double d)
 static double truth_at(shape s, int x, int y, double d)
 {
     double u = (x - SIZE / 2) * PIXEL, v = (y - SIZE / 2) * PIXEL;
-    double all = s == BALL       ? ball_integral(u, v, d)
+    double n[3] = {u / radius, -v / radius, sqrt(fmax(0, 1 - (u * u + v * v) / (radius * radius)))};
+    double all = s == BALL       ? ball_integral(n, d)
                  : s == CYLINDER ? curve_integral(s, asin(u / radius), d)
                                  : curve_integral(s, u, d);
     return all;
@@ -226,8 +227,7 @@ static void measure(shape kind, double dense[3][3], double taps[3][3])
 static void surface_is_nearest(void **state)
 {
     (void)state;
-    static const char *const words[] = {"area", "plain", "surface"};
-    static const double most[] = {0.25, 1.4, 0.45}; /* measured 0.13, 1.26, 0.32 */
+    static const double most[] = {0.25, 1.4, 0.45}; /* measured 0.14, 1.27, 0.29 */
     double all[3] = {0};
     for (shape kind = BALL; kind <= WAVES; kind++) {
         double dense[3][3], taps[3][3], of_dense[3] = {0}, of_taps[3] = {0};
@@ -248,6 +248,92 @@ static void surface_is_nearest(void **state)
     assert_true(all[SURFACE] < 0.5 * all[AREA] && all[AREA] < 0.8 * all[PLAIN]);
 }
 
+/* ---- off the axis ---- */
+
+/* What pixel (x, y) sees of the ball at `middle`, mm in view space: false where there is nothing. */
+static bool seen_at(const camera_t *c, const double middle[3], int x, int y, double *depth, double n[3])
+{
+    double ray[3] = {(x + 0.5 - c->centre[0]) / c->focal[0], -(y + 0.5 - c->centre[1]) / c->focal[1], -1};
+    double rr = 0, rm = 0, mm = 0;
+    for (int i = 0; i < 3; i++) {
+        rr += ray[i] * ray[i];
+        rm += ray[i] * middle[i];
+        mm += middle[i] * middle[i];
+    }
+    double root = rm * rm - rr * (mm - radius * radius);
+    if (root <= 0)
+        return false;
+    *depth = (rm - sqrt(root)) / rr;
+    for (int i = 0; i < 3; i++)
+        n[i] = (*depth * ray[i] - middle[i]) / radius;
+    return true;
+}
+
+/* The mean of a channel's errors beside the mean of the truth, of pixels that see the ball less than 65
+ * degrees from its middle. */
+static double error_at(const sss_scene *s, const double middle[3], size_t c, double *bias)
+{
+    double sum = 0, more = 0, all = 0,
+           length = sqrt(middle[0] * middle[0] + middle[1] * middle[1] + middle[2] * middle[2]);
+    for (int y = 2; y < SIZE; y += STEP)
+        for (int x = 2; x < SIZE; x += STEP) {
+            double depth, n[3], facing = 0;
+            if (!seen_at(&s->twin.frame.camera, middle, x, y, &depth, n))
+                continue;
+            for (int i = 0; i < 3; i++)
+                facing -= n[i] * middle[i] / length;
+            if (facing < cos(65 * pi / 180))
+                continue;
+            double truth = ball_integral(n, distance_mm[c]);
+            double got = (double)s->filtered[c * s->n + (size_t)(y * s->twin.frame.columns + x)];
+            sum += fabs(got - truth);
+            more += got - truth;
+            all += truth;
+        }
+    *bias = more / all;
+    return sum / all;
+}
+
+/* A ball 31 degrees off the axis of a wide lens. `surface` is off by 2.1, 0.5 and 0.1 %; with distances of
+ * the screen's plane it would be by 8.0, 4.5 and 1.9 %. The others take those: `area` is off by 7.5, 3.3
+ * and 1.3 %. */
+static void surface_holds_off_the_axis(void **state)
+{
+    (void)state;
+    const double middle[3] = {50, 30, -97};
+    sss_scene s = sss_scene_make(0, 0, SIZE, SIZE, 330);
+    camera_t *c = &s.twin.frame.camera;
+    c->centre[0] -= c->focal[0] * (float)(middle[0] / -middle[2]);
+    c->centre[1] += c->focal[1] * (float)(middle[1] / -middle[2]);
+    SSS_EACH_PIXEL(&s, x, y, i)
+    {
+        double depth, n[3];
+        if (!seen_at(c, middle, x, y, &depth, n))
+            continue;
+        s.stencil[i] = 1;
+        s.depth[i] = (float)(depth * 1e-3);
+        for (size_t k = 0; k < 3; k++)
+            s.diffuse[k * s.n + i] = (float)lit(n[0], n[1], n[2]);
+    }
+    for (int pass = 0; pass < 2; pass++) {
+        double all[3] = {0}, bias;
+        for (int w = 0; w < 3; w++) {
+            if (pass == 0)
+                sss_run_reference(&s, w);
+            else
+                sss_run_burley(&s, 1024, w);
+            for (size_t k = 0; k < 3; k++) {
+                double error = error_at(&s, middle, k, &bias);
+                print_message("off the axis, %s, %s: channel %zu off by %.2f %% (%+.2f)\n", words[w],
+                              pass ? "1024 taps" : "dense", k, 100 * error, 100 * bias);
+                all[w] += error / 3;
+            }
+        }
+        assert_true(all[SURFACE] < 0.012 && all[SURFACE] < 0.3 * all[AREA]);
+    }
+    sss_scene_free(&s);
+}
+
 static int open_three(void **state)
 {
     for (int c = 0; c < 3; c++)
@@ -257,6 +343,7 @@ static int open_three(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(surface_is_nearest)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(surface_is_nearest),
+                                       cmocka_unit_test(surface_holds_off_the_axis)};
     return cmocka_run_group_tests(tests, open_three, sss_close);
 }

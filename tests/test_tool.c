@@ -16,10 +16,10 @@
 
 #include "graph/model/pass.h"
 #include "graph/relit.h"
+#include "graph/run/exr.h"
 #include "tests/tool_run.h"
 
 static char capture[PATH_MAX]; /* captures/monkey */
-static char program[PATH_MAX]; /* relit itself, beside the tests */
 
 static const char pipeline[] =
     "relit: 1\n"
@@ -100,6 +100,18 @@ static void test_help(void **state)
         tool_result_free(&one);
     }
     tool_result_free(&r);
+    r = RUN("help", "plan");
+    tool_result same = RUN("plan", "--help");
+    expect(&r, 0);
+    assert_string_equal(r.out, same.out);
+    tool_result_free(&r);
+    tool_result_free(&same);
+    r = RUN("help");
+    same = RUN("--help");
+    expect(&r, 0);
+    assert_string_equal(r.out, same.out);
+    tool_result_free(&r);
+    tool_result_free(&same);
 }
 
 static void test_version(void **state)
@@ -150,6 +162,7 @@ static void test_usage(void **state)
         {{"run", "p", "--shard", "0/3"}, "I from 1 to N"},
         {{"run", "p", "--shard", "4/3"}, "I from 1 to N"},
         {{"run", "p", "--shard", "3"}, "I from 1 to N"},
+        {{"run", "p", "--shard", "1/1000001"}, "I from 1 to N"},
         {{"run", "p", "--preroll", "4"}, "give --shard I/N too"},
         {{"ab"}, "needs a PIPELINE, see"},
         {{"ab", "p", "--sheet="}, "option '--sheet' takes [=FILE], found ''"},
@@ -158,6 +171,7 @@ static void test_usage(void **state)
         {{"run", "p", "--pairs"}, "it is for ab"},
         {{"bench", "--size", "1920"}, "WxH in pixels"},
         {{"bench", "--size", "0x10"}, "WxH in pixels"},
+        {{"bench", "--size", "10x65537"}, "WxH in pixels"},
         {{"inspect", "p", "--resume"}, "it is for run, check, plan"},
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
@@ -297,7 +311,7 @@ static interrupted interrupt(int number, int again, const char *pipe, const char
         dup2(errors[1], 2);
         close(results[0]);
         close(errors[0]);
-        execl(program, "relit", "run", pipe, "--out", out, "--json", "--quiet", (char *)NULL);
+        execl(tool_program(), "relit", "run", pipe, "--out", out, "--json", "--quiet", (char *)NULL);
         _exit(127);
     }
     close(results[1]);
@@ -367,13 +381,110 @@ static void test_check_writes_nothing(void **state)
     r = RUN("check", pipe, "--capture", capture, "--json");
     expect(&r, 0);
     json_t *json = json_loads(r.out, 0, NULL);
-    assert_non_null(json);
+    assert_true(json_is_true(json_object_get(json, "ok")));
+    assert_int_equal(json_array_size(json_object_get(json, "errors")), 0);
     json_decref(json);
+    tool_result_free(&r);
+    r = RUN("check", pipe, "--capture", capture, "--quiet");
+    expect(&r, 0);
+    assert_string_equal(r.out, "");
+    assert_string_equal(r.err, "");
     tool_result_free(&r);
     r = RUN("check", pipe, "--capture", capture, "--out", pipe);
     expect(&r, 2); /* a file is in the way */
     tool_result_free(&r);
     free(out);
+    leave(folder, pipe);
+}
+
+/* What is wrong is on stdout with --json, too. */
+static void test_check_json_failure(void **state)
+{
+    (void)state;
+    char *pipe, *folder = enter(&pipe);
+    tool_result r = RUN("check", pipe, "--capture", capture, "--json", "--set", "graph.sss.tapps=3");
+    expect(&r, 2);
+    assert_int_equal(lines(r.err), 1);
+    json_t *json = json_loads(r.out, 0, NULL), *errors = json_object_get(json, "errors");
+    assert_true(json_is_false(json_object_get(json, "ok")));
+    assert_int_equal(json_array_size(errors), 1);
+    json_t *error = json_array_get(errors, 0);
+    assert_string_equal(json_string_value(json_object_get(error, "code")), "RL_E_CONFIG");
+    assert_string_equal(json_string_value(json_object_get(error, "file")), "--set graph.sss.tapps=3");
+    assert_int_equal(json_integer_value(json_object_get(error, "line")), 1);
+    assert_non_null(strstr(json_string_value(json_object_get(error, "text")), "did you mean 'taps'?"));
+    json_decref(json);
+    tool_result_free(&r);
+    r = RUN("check", "gone.yaml", "--json");
+    expect(&r, 2);
+    assert_non_null(strstr(r.out, "\"ok\":false,\"captures\":[]"));
+    tool_result_free(&r);
+    leave(folder, pipe);
+}
+
+/* A profile that lets light through, and a capture that does not say how thick things are. */
+static void test_check_missed_layers(void **state)
+{
+    (void)state;
+    size_t size;
+    char *pipe, *folder = enter(&pipe), *manifest = path_in(capture, "capture.yaml");
+    char *files = path_in(capture, "monkey.####.exr"), *text = file_read(manifest, &size);
+    char *here = text_replace(text, "monkey.####.exr", files);
+    char *some = text_replace(here, "  thickness: {channels: [thickness.T]}\n", "");
+    char *none = text_replace(some,
+                              "  shadow_thickness: {key: shadow_thickness.key, rim: shadow_thickness.rim, "
+                              "fill: shadow_thickness.fill}\n",
+                              "");
+    const struct {
+        const char *manifest, *set;
+        bool noted;
+    } rows[] = {{none, "profiles.skin.transmission=thick", true},
+                {none, "profiles.skin.transmission=none", false},
+                {some, "profiles.skin.transmission=thick", false}};
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        file_write(folder, "capture.yaml", rows[i].manifest, strlen(rows[i].manifest));
+        tool_result r = RUN("check", pipe, "--capture", folder, "--set", rows[i].set);
+        expect(&r, 0);
+        const char *said = strstr(r.err, "note: pass 'light' (lighting): the profile of material 'skin' has "
+                                         "'transmission: thick', but there is no 'thickness' and no "
+                                         "'shadow_thickness': no light comes through");
+        assert_int_equal(said != NULL, rows[i].noted);
+        tool_result_free(&r);
+        r = RUN("check", pipe, "--capture", folder, "--set", rows[i].set, "--set",
+                "shading.transmission=false");
+        expect(&r, 0);
+        assert_string_equal(r.err, "");
+        tool_result_free(&r);
+    }
+    free(none);
+    free(some);
+    free(here);
+    free(text);
+    free(files);
+    free(manifest);
+    leave(folder, pipe);
+}
+
+/* --trace is an option that run, ab, check and plan share. */
+static void test_check_trace(void **state)
+{
+    (void)state;
+    char *pipe, *folder = enter(&pipe), *path = path_in(folder, "t.json");
+    tool_result r = RUN("check", pipe, "--capture", capture, "--frames", "1-3", "--trace", path);
+    expect(&r, 0);
+    tool_result_free(&r);
+    json_t *json = json_load_file(path, 0, NULL), *event;
+    size_t i, headers = 0, others = 0;
+    json_array_foreach(json_object_get(json, "traceEvents"), i, event)
+    {
+        const char *name = json_string_value(json_object_get(event, "name"));
+        headers += !strcmp(name, "header");
+        others += !strcmp(name, "open") || !strcmp(name, "compile");
+    }
+    assert_int_equal(headers, 3);
+    assert_int_equal(others, 2);
+    json_decref(json);
+    free(path);
     leave(folder, pipe);
 }
 
@@ -469,6 +580,20 @@ static void test_init(void **state)
                        "#  key: {type: point, position: [-0.5, -0.52, 0.47], intensity: [2.2, 2.024, 1.804]");
     expect_init_checks(manifest, "#  skin: {scatter_distance_mm: [3.0, 1.2, 0.7]}");
     expect_init_checks(file, "id-6: {stencil: 6}"); /* no manifest: ids from the pixels */
+    /* two ids of one name are one material */
+    size_t size;
+    char *folder = folder_new(), *text = file_read(manifest, &size),
+         *files = path_in(capture, "monkey.####.exr");
+    char *here = text_replace(text, "monkey.####.exr", files),
+         *twice = text_replace(here, "6: marble", "6: wax");
+    file_write(folder, "capture.yaml", twice, strlen(twice));
+    expect_init_checks(folder,
+                       "  wax: {stencil: [4, 6]}    # {stencil: [4, 6], profile: wax}\n  eyes: {stencil: 5}");
+    free(twice);
+    free(here);
+    free(files);
+    free(text);
+    folder_remove(folder);
     free(file);
     free(manifest);
 }
@@ -544,6 +669,7 @@ static void test_inspect(void **state)
     assert_non_null(strstr(r.out, "camera:jitter (v2f): [0 -0.1666"));
     assert_non_null(strstr(r.out, "relit_capture: 1\n"));
     assert_non_null(strstr(r.out, "files: monkey.####.exr\nframes: 1-8")); /* the sequence that it is of */
+    assert_null(strstr(r.out, "no attribute"));
     tool_result_free(&r);
     r = RUN("inspect", capture);
     expect(&r, 0);
@@ -552,7 +678,63 @@ static void test_inspect(void **state)
     r = RUN("inspect", folder); /* neither a capture nor an EXR */
     expect(&r, 2);
     tool_result_free(&r);
+    r = RUN("init", folder);
+    expect(&r, 2);
+    assert_non_null(strstr(r.err, "the folder holds no capture.yaml (`relit inspect "));
+    tool_result_free(&r);
+    r = RUN("check", folder);
+    expect(&r, 2);
+    assert_non_null(strstr(r.err, "this is a folder, not a pipeline (`relit init` prints"));
+    tool_result_free(&r);
+    r = RUN("check", file);
+    expect(&r, 2);
+    assert_non_null(strstr(r.err, "this is an OpenEXR file, not YAML (`relit init` prints"));
+    tool_result_free(&r);
     free(file);
+    folder_remove(folder);
+}
+
+/* Channels that no preset knows: the manifest has gaps, which are filled in by hand. */
+static void test_inspect_gaps(void **state)
+{
+    (void)state;
+    static const char *const names[] = {"albedo.R", "albedo.G", "albedo.B", "N.x",
+                                        "N.y",      "N.z",      "depth.Z",  "mat"};
+    static float plane[64];
+    rl_exr_source channels[8];
+    for (int i = 0; i < 8; i++)
+        channels[i] = (rl_exr_source){.name = names[i], .type = RL_EXR_FLOAT, .floats = plane, .stride = 8};
+    rl_exr_image image = {.data_window = {0, 0, 7, 7},
+                          .display_window = {0, 0, 7, 7},
+                          .channels = channels,
+                          .n_channels = 8,
+                          .compression = RL_EXR_ZIP};
+    char *folder = folder_new(), *file = path_in(folder, "odd.0001.exr"),
+         *yaml = path_in(folder, "capture.yaml");
+    rl_error err = {0};
+    assert_int_equal(rl_exr_write(file, &image, NULL, NULL, &err), RL_OK);
+    tool_result r = RUN("inspect", file), again;
+    expect(&r, 0);
+    char *guess = strstr(r.out, "# no preset finds all that relit needs: normal, stencil missing in 'relit'");
+    assert_non_null(guess);
+    assert_non_null(strstr(guess, "# the file has no attribute worldToCamera: give camera.matrix"));
+    assert_non_null(strstr(guess, "# the file has no attribute camera:fovx: give camera.fov_x"));
+    assert_non_null(
+        strstr(guess, "  albedo: {channels: [albedo.R, albedo.G, albedo.B], colorspace: lin_rec709}\n"));
+    assert_non_null(strstr(guess, "  depth: {channels: [depth.Z], kind: planar, empty: 1e10}\n"));
+    char *normal = text_replace(guess, "#normal: {channels: [?, ?, ?]", "normal: {channels: [N.x, N.y, N.z]");
+    char *whole = text_replace(normal, "#stencil: {channels: [?]}", "stencil: {channels: [mat]}");
+    file_write(folder, "capture.yaml", whole, strlen(whole));
+    again = RUN("inspect", yaml);
+    expect(&again, 0);
+    assert_non_null(
+        strstr(again.out, "normal: {channels: [N.x, N.y, N.z], space: world, encoding: signed}\n"));
+    tool_result_free(&again);
+    tool_result_free(&r);
+    free(whole);
+    free(normal);
+    free(file);
+    free(yaml);
     folder_remove(folder);
 }
 
@@ -607,7 +789,14 @@ static void test_passes(void **state)
     expect(&json, 0);
     json_t *list = json_loads(json.out, 0, NULL);
     assert_true(json_is_array(list));
-    assert_int_equal(json_array_size(list), rl_pass_count());
+    assert_int_equal(json_array_size(list), rl_pass_count() + 1); /* and the user's own */
+    tool_result own = RUN("passes", "kernel", "--json");
+    expect(&own, 0);
+    json_t *kernel = json_loads(own.out, 0, NULL);
+    assert_string_equal(json_string_value(json_object_get(kernel, "name")), "kernel");
+    assert_true(json_equal(kernel, json_array_get(list, rl_pass_count())));
+    json_decref(kernel);
+    tool_result_free(&own);
     for (size_t i = 0; i < rl_pass_count(); i++) {
         const rl_pass *pass = rl_pass_at(i);
         tool_result r = RUN("passes", pass->name);
@@ -688,29 +877,19 @@ static void test_program(void **state)
 {
     (void)state;
     const char *version[] = {"--version", NULL}, *wrong[] = {"rum", NULL};
-    tool_result r = tool_spawn(program, NULL, version);
+    tool_result r = tool_spawn(tool_program(), NULL, version);
     expect(&r, 0);
     assert_string_equal(r.out, "relit " RL_VERSION "\n");
     tool_result_free(&r);
-    r = tool_spawn(program, NULL, wrong);
+    r = tool_spawn(tool_program(), NULL, wrong);
     expect(&r, 2);
     assert_string_equal(r.out, "");
     tool_result_free(&r);
 }
 
-static void find_program(void)
-{
-    ssize_t n = readlink("/proc/self/exe", program, sizeof program - 16);
-    program[n > 0 ? n : 0] = 0;
-    for (int i = 0; i < 2 && strrchr(program, '/'); i++) /* BUILD/tests/test_tool -> BUILD */
-        *strrchr(program, '/') = 0;
-    strcat(program, "/relit");
-}
-
 int main(int argc, char **argv)
 {
     tool_child(argc, argv);
-    find_program();
     if (!realpath("captures/monkey", capture)) {
         fprintf(stderr, "run this from the repository: captures/monkey is not here\n");
         return 1;
@@ -725,12 +904,16 @@ int main(int argc, char **argv)
         cmocka_unit_test(test_run_json_failure),
         cmocka_unit_test(test_signals),
         cmocka_unit_test(test_check_writes_nothing),
+        cmocka_unit_test(test_check_json_failure),
+        cmocka_unit_test(test_check_missed_layers),
+        cmocka_unit_test(test_check_trace),
         cmocka_unit_test(test_check_opens_every_header),
         cmocka_unit_test(test_plan),
         cmocka_unit_test(test_plan_svg),
         cmocka_unit_test(test_init),
         cmocka_unit_test(test_init_uncommented),
         cmocka_unit_test(test_inspect),
+        cmocka_unit_test(test_inspect_gaps),
         cmocka_unit_test(test_inspect_folder),
         cmocka_unit_test(test_passes),
         cmocka_unit_test(test_kernel_example),

@@ -7,6 +7,7 @@
 #include "tests/tool_run.h"
 
 #include <ftw.h>
+#include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -88,6 +89,16 @@ tool_result tool_run_child(const char *setting, const char *const *arguments)
     for (int i = 0; arguments[i] && i < 62; i++)
         words[i + 1] = arguments[i];
     return tool_spawn("/proc/self/exe", setting, words);
+}
+
+const char *tool_program(void)
+{
+    static char path[PATH_MAX];
+    ssize_t n = readlink("/proc/self/exe", path, sizeof path - 16);
+    path[n > 0 ? n : 0] = 0;
+    for (int i = 0; i < 2 && strrchr(path, '/'); i++) /* BUILD/tests/test_tool -> BUILD */
+        *strrchr(path, '/') = 0;
+    return strcat(path, "/relit");
 }
 
 void tool_result_free(tool_result *r)

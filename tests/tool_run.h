@@ -20,6 +20,8 @@ void tool_child(int argc, char **argv);
 /* Any program. */
 tool_result tool_spawn(const char *program, const char *setting, const char *const *arguments);
 void tool_result_free(tool_result *r);
+/* relit itself, in the build folder that the tests are in; kept until the program ends. */
+const char *tool_program(void);
 
 /* A fresh folder under $TMPDIR; removed with all that is in it by folder_remove. The result is malloc'ed. */
 char *folder_new(void);

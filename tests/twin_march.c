@@ -3,6 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "tests/twin_hash.h"
 #include "tests/twin_shading.h"
 
 /* Point + t way, view space with depth instead of -z; t < end. */
@@ -91,13 +92,7 @@ static int count_steps(const frame_t *f, const view_ray *r, int major, int direc
 static int first_step(const frame_t *f, const march_params *p, int stride, int which, int x, int y)
 {
     uint32_t a = (uint32_t)p->seed + 0x632BE5ABu * (uint32_t)which, b = (uint32_t)f->number;
-    uint32_t h = a * 0x9E3779B1u ^ b * 0x85EBCA77u ^ (uint32_t)(x + f->origin[0]) * 0xC2B2AE3Du ^
-                 (uint32_t)(y + f->origin[1]) * 0x27D4EB2Fu;
-    h ^= h >> 15;
-    h *= 0x2C1B3C6Du;
-    h ^= h >> 12;
-    h *= 0x297A2D39u;
-    h ^= h >> 15;
+    uint32_t h = twin_hash(a, b, (uint32_t)(x + f->origin[0]), (uint32_t)(y + f->origin[1]));
     int first = (int)((double)(h >> 8) / 16777216 * stride);
     return 1 + first;
 }

@@ -10,6 +10,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 
 #include "graph/base/alloc.h"
 
@@ -228,6 +229,21 @@ const char *rl_nearest(const char *name, const char *const *candidates, size_t n
     return best;
 }
 
+/* The only candidate that begins as `name` does, which has at least three letters ("lamb" for "lambert"). */
+static const char *completed(const char *name, const char *const *candidates, size_t n)
+{
+    const char *found = NULL;
+    size_t length = strlen(name);
+    for (size_t i = 0; i < n && length >= 3; i++) {
+        if (strncasecmp(candidates[i], name, length))
+            continue;
+        if (found)
+            return NULL;
+        found = candidates[i];
+    }
+    return found;
+}
+
 static int by_name(const void *a, const void *b)
 {
     return strcmp(*(const char *const *)a, *(const char *const *)b);
@@ -236,6 +252,7 @@ static int by_name(const void *a, const void *b)
 void rl_suggest(rl_str *s, const char *name, const char *const *candidates, size_t n, const char *what)
 {
     const char *near = rl_nearest(name, candidates, n);
+    near = near ? near : completed(name, candidates, n);
     if (near)
         rl_str_printf(s, "; did you mean '%s'?", near);
     if (!n)

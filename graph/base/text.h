@@ -42,7 +42,8 @@ char *rl_format_bytes(unsigned long long bytes, char *out);
 /* The candidate nearest to `name` (Damerau-Levenshtein, at most a third of the length away), or NULL. */
 const char *rl_nearest(const char *name, const char *const *candidates, size_t n);
 
-/* Adds "; did you mean 'x'? known: a, b, c" (the first part only when something is near, names sorted).
+/* Adds "; did you mean 'x'? known: a, b, c" (the first part only when something is near, or `name` is the
+ * beginning of one candidate, three letters at least; names sorted).
  * `what` is the word before the list, e.g. "known". */
 void rl_suggest(rl_str *s, const char *name, const char *const *candidates, size_t n, const char *what);
 

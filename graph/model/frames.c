@@ -118,15 +118,16 @@ long rl_frames_find(const rl_frames *frames, int number)
     return p ? (long)(p - frames->numbers) : -1;
 }
 
-rl_code rl_frames_check(const rl_frames *listed, const rl_frames *wanted, rl_where where, rl_error *err)
+rl_code rl_frames_check(const rl_frames *listed, const char *capture, const rl_frames *wanted, rl_where where,
+                        rl_error *err)
 {
     for (size_t i = 0; i < wanted->n; i++) {
         if (rl_frames_find(listed, wanted->numbers[i]) >= 0)
             continue;
         rl_str there = {0};
         rl_frames_print(listed, &there);
-        rl_code code = rl_fail(err, RL_E_USAGE, where, "frame %d is not in the capture, which lists %s",
-                               wanted->numbers[i], there.length ? rl_str_text(&there) : "none");
+        rl_code code = rl_fail(err, RL_E_USAGE, where, "frame %d is not in the capture '%s', which lists %s",
+                               wanted->numbers[i], capture, there.length ? rl_str_text(&there) : "none");
         rl_str_free(&there);
         return code;
     }

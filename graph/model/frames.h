@@ -31,8 +31,10 @@ rl_frames rl_frames_from(int *numbers, size_t n);
 /* The index of a frame, or -1. */
 long rl_frames_find(const rl_frames *frames, int number);
 
-/* All of `wanted` are in `listed`, else RL_E_USAGE that names the first that is not, and what there is. */
-rl_code rl_frames_check(const rl_frames *listed, const rl_frames *wanted, rl_where where, rl_error *err);
+/* All of `wanted` are in `listed`, those of a capture, else RL_E_USAGE that names the first that is not, the
+ * capture, and what it has. */
+rl_code rl_frames_check(const rl_frames *listed, const char *capture, const rl_frames *wanted, rl_where where,
+                        rl_error *err);
 
 /* Adds a spec that reads back as the same set: three or more in a row, or four or more of one step, as a
  * range. */

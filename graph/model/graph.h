@@ -69,7 +69,8 @@ typedef struct rl_wanted {
 } rl_wanted;
 
 /* Binds ports: a named input to its image; an unnamed one to the capture layer of the port's name; an
- * optional one without such a layer stays absent; else an error that names node, pass, port and layer.
+ * optional one without such a layer stays absent, and one whose image is named "none"; else an error that
+ * names node, pass, port and layer.
  * Errors: unknown image, node, port (nearest name), a wrong format ("port 'depth' takes a scalar,
  * 'light.diffuse' is rgb"), an input given twice, a cycle (printed whole: "sss -> aa -> sss"; history makes
  * no edge). */

@@ -4,6 +4,7 @@
 #include "graph/model/graph_build.h"
 
 #define CAPTURE "capture"
+#define NOTHING "none" /* no image has a name without a dot */
 
 /* ---- names -----------------------------------------------------------------------------------------------
  */
@@ -171,6 +172,12 @@ static rl_code bind_named(rl_graph_builder *b, size_t index, const char *user, c
         return fail_port(b, node, user, in);
     if (node->images[port] >= 0)
         return rl_fail(b->err, RL_E_CONFIG, in->where, "%s: input '%s' is given twice", user, in->port);
+    if (!strcmp(in->image, NOTHING) && node->pass->ports.rows[port].optional)
+        return RL_OK;
+    if (!strcmp(in->image, NOTHING))
+        return rl_fail(b->err, RL_E_CONFIG, in->where,
+                       "%s: port '%s' needs an image (%s): only optional ones can be '" NOTHING "'", user,
+                       in->port, rl_format_name(node->pass->ports.rows[port].format));
     const char *asker = rl_arena_printf(b->arena, "%s: port '%s'", user, in->port);
     if (!asker)
         return rl_fail_memory(b->err, strlen(user) + strlen(in->port));
@@ -179,6 +186,15 @@ static rl_code bind_named(rl_graph_builder *b, size_t index, const char *user, c
         code = rl_graph_check_format(b, user, &node->pass->ports.rows[port], image, in->where);
     b->bound[index][port] = image;
     return code;
+}
+
+/* Whether `in:` says that an (optional) port is to have no image. */
+static bool is_left_out(const rl_node_input *inputs, size_t n, const char *port)
+{
+    for (size_t i = 0; i < n; i++)
+        if (!strcmp(inputs[i].port, port) && !strcmp(inputs[i].image, NOTHING))
+            return true;
+    return false;
 }
 
 /* A port that no `in:` names takes the capture's layer of its name. */
@@ -239,7 +255,8 @@ rl_code rl_graph_bind(rl_graph_builder *b, size_t index, const rl_node_input *in
     for (size_t i = 0; i < n_inputs && code == RL_OK; i++)
         code = bind_named(b, index, user, &inputs[i]);
     for (size_t p = 0; p < node->pass->ports.n && code == RL_OK; p++)
-        if (node->pass->ports.rows[p].role == RL_READ && node->images[p] < 0)
+        if (node->pass->ports.rows[p].role == RL_READ && node->images[p] < 0 &&
+            !is_left_out(inputs, n_inputs, node->pass->ports.rows[p].name))
             code = bind_implicit(b, index, user, p);
     for (size_t p = 0; p < node->pass->ports.n && code == RL_OK; p++)
         if (node->pass->ports.rows[p].role == RL_HISTORY)

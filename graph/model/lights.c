@@ -225,7 +225,7 @@ static rl_code read_spot(const rl_value *v, rl_light_spec *l, rl_error *err)
         return rl_fail(err, RL_E_CONFIG, v->where, "light '%s': a spot light needs 'angle' (full, degrees)",
                        l->name);
     double degrees = 0;
-    rl_code code = rl_value_number(angle, "angle", 0.01, 179.9, &degrees, err);
+    rl_code code = rl_value_number(angle, "angle", 0.01, 180, &degrees, err);
     if (!code && blend)
         code = rl_value_number(blend, "blend", 0, 1, &l->blend, err);
     l->angle = degrees * pi / 180;

@@ -110,8 +110,8 @@ static rl_code check_lengths(rl_manifest_reader *r)
     for (size_t i = 0; i < 3; i++)
         if (lists[i].source == RL_SOURCE_LIST && lists[i].n != r->m->frames.n)
             return rl_fail(r->err, RL_E_CONFIG, c->where,
-                           "camera: '%s' lists %zu, but the capture has %zu frames", lists[i].name,
-                           lists[i].n, r->m->frames.n);
+                           "camera: '%s' lists %zu, but the capture has %zu frame%s", lists[i].name,
+                           lists[i].n, r->m->frames.n, r->m->frames.n == 1 ? "" : "s");
     return RL_OK;
 }
 
@@ -207,10 +207,20 @@ rl_code rl_manifest_load(rl_arena *arena, const char *path, const char *presets,
                          rl_manifest **out, rl_error *err)
 {
     rl_value *v;
+    const char *given = path;
     *out = NULL;
     if (rl_path_is_folder(path) && !(path = rl_path_join(arena, path, "capture.yaml")))
         return rl_fail_memory(err, 64);
+    if (path != given && !rl_path_exists(path))
+        return rl_fail_file(
+            err, RL_E_IO, given,
+            "the folder holds no capture.yaml (`relit inspect %s` prints one for the EXR files "
+            "in it)",
+            given);
     rl_code code = rl_config_load(arena, path, &v, err);
+    if (!code && rl_value_get(v, "relit") && !rl_value_get(v, "relit_capture"))
+        return rl_fail_file(err, RL_E_CONFIG, path,
+                            "this is a pipeline, not the manifest of a capture (its `capture:` names one)");
     return code ? code : rl_manifest_parse(arena, v, presets, log, out, err);
 }
 

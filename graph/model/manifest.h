@@ -76,7 +76,8 @@ typedef struct rl_layer {
     bool from_preset; /* not the user's own: dropped by rl_manifest_bind when the file lacks it */
 
     const char *colorspace; /* albedo, emission, back_albedo */
-    rl_space space;         /* normals */
+    rl_where colorspace_where;
+    rl_space space; /* normals */
     rl_encoding encoding;
     rl_depth_kind kind;   /* depths */
     double near_m, far_m; /* RL_DEPTH_DEVICE; metres, 0 < near < far, far may be infinite */
@@ -187,7 +188,8 @@ typedef struct rl_channel {
 /* Chooses among alternatives and fills in '*' from the channels that one frame's file holds; layers of a
  * preset that it lacks are dropped, layers of the user are left as they are. Call it for one pattern's file
  * (`file`, for errors), with the pattern's index, before the layers of that pattern are read. Manifests
- * without preset are left as they are. */
+ * without preset are left as they are. A required layer that is not there is an error, or dropped, too, when
+ * `file` is NULL: for a manifest to start from. */
 rl_code rl_manifest_bind(rl_arena *arena, rl_manifest *m, int pattern, const char *file,
                          const rl_channel *channels, size_t n, rl_error *err);
 

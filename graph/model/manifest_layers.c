@@ -157,7 +157,8 @@ static rl_code read_depth(const layer_reader *l)
     if (!code && word == RL_DEPTH_DEVICE)
         code = read_device(l);
     if (!code && empty)
-        code = rl_value_number(empty, "empty", -INFINITY, INFINITY, &l->layer->empty, err);
+        code = rl_value_number(empty, "empty", word == RL_DEPTH_DEVICE ? -INFINITY : DBL_MIN, INFINITY,
+                               &l->layer->empty, err);
     return code;
 }
 
@@ -234,6 +235,7 @@ static rl_code read_layer(rl_manifest_reader *r, rl_layer_id id, const rl_entry 
     if (!code && has_key(type, "colorspace")) {
         const rl_value *v = stated(&l, "colorspace", "lin_rec709");
         layer->colorspace = "lin_rec709";
+        layer->colorspace_where = v ? v->where : layer->where;
         code = v ? rl_value_text(v, "colorspace", &layer->colorspace, r->err) : RL_OK;
     }
     const rl_value *part = rl_value_get(l.map, "part"),

@@ -1,6 +1,7 @@
 /* Profiles, shading and materials, from their maps to the table. */
 #include "graph/model/materials_forms.h"
 #include "graph/model/materials_ids.h"
+#include "graph/model/params_list.h"
 
 #include <string.h>
 
@@ -75,21 +76,6 @@ static char *entry_at(const reader *r, size_t material)
     return r->data + material * r->m->entry_bytes;
 }
 
-/* Reads a whole map of one group into an entry. */
-static rl_code read_group(reader *r, const rl_value *map, const char *section, const char *name, char *entry)
-{
-    rl_code code = need_map(r, map, name ? name : section);
-    for (size_t i = 0; !code && map && i < map->n; i++) {
-        const rl_material_row *row = find_row(r, section, map->entries[i].key);
-        code = row ? rl_param_read(row->param, map->entries[i].value, entry + row->offset, r->err)
-                   : unknown_key(r, &map->entries[i], section, name);
-    }
-    return code;
-}
-
-/* ---- profiles
- * ------------------------------------------------------------------------------------------------ */
-
 static bool reads(const rl_pass *pass, const char *key)
 {
     for (size_t i = 0; i < pass->profile_keys.n; i++)
@@ -98,16 +84,42 @@ static bool reads(const rl_pass *pass, const char *key)
     return false;
 }
 
+static bool any_reads(const reader *r, const char *key)
+{
+    for (size_t i = 0; i < r->n_used; i++)
+        if (reads(r->used[i], key))
+            return true;
+    return false;
+}
+
+static rl_code read_value(const reader *r, const rl_param *row, const rl_value *v, char *out)
+{
+    if (row->type == RL_ROWS && !any_reads(r, row->name))
+        return rl_list_read(row, v, out, r->err);
+    return rl_param_read(row, v, out, r->err);
+}
+
+/* Reads a whole map of one group into an entry. */
+static rl_code read_group(reader *r, const rl_value *map, const char *section, const char *name, char *entry)
+{
+    rl_code code = need_map(r, map, name ? name : section);
+    for (size_t i = 0; !code && map && i < map->n; i++) {
+        const rl_material_row *row = find_row(r, section, map->entries[i].key);
+        code = row ? read_value(r, row->param, map->entries[i].value, entry + row->offset)
+                   : unknown_key(r, &map->entries[i], section, name);
+    }
+    return code;
+}
+
+/* ---- profiles
+ * ------------------------------------------------------------------------------------------------ */
+
 static void note_unread(const reader *r, const rl_value *profile, const char *name)
 {
-    for (size_t i = 0; i < profile->n; i++) {
-        bool read = false;
-        for (size_t k = 0; k < r->n_used; k++)
-            read |= reads(r->used[k], profile->entries[i].key);
-        if (!read)
+    for (size_t i = 0; i < profile->n; i++)
+        if (!any_reads(r, profile->entries[i].key))
             rl_report(r->log, RL_VERBOSE, profile->entries[i].where,
                       "profile '%s': no pass of the graph reads '%s'", name, profile->entries[i].key);
-    }
 }
 
 /* Whether the profile in `entry` has what makes the row required: "KEY=a|b". */

@@ -1,3 +1,4 @@
+/* Parameters from YAML: one row, a pass's struct. */
 #include "graph/model/params_list.h"
 
 #include <float.h>
@@ -17,19 +18,6 @@ rl_code rl_fail_suggest(rl_error *err, rl_where where, const char *text, const c
 
 /* ---- words
  * -------------------------------------------------------------------------------------------------- */
-
-/* Appends word `index` of "a|b|c"; false when there is none. */
-static bool add_word(rl_str *s, const char *words, int index)
-{
-    for (; words && index > 0; index--) {
-        words = strchr(words, '|');
-        words = words ? words + 1 : NULL;
-    }
-    if (!words || index < 0)
-        return false;
-    rl_str_addn(s, words, strcspn(words, "|"));
-    return true;
-}
 
 /* The index of the n characters of `text` among "a|b|c", or -1. */
 static int find_wordn(const char *words, const char *text, size_t n)
@@ -59,41 +47,6 @@ bool rl_param_is(const rl_param *row, const void *value, const char *words)
         words = words ? words + 1 : NULL;
     }
     return false;
-}
-
-/* ---- ranges as text
- * ------------------------------------------------------------------------------------------ */
-
-/* "0 … 1", "≥ 0", "≤ 1", or nothing: limits that the type has anyway are not worth a word. */
-static void add_range(const rl_param *row, rl_str *s)
-{
-    double least = row->type == RL_I32 ? (double)INT32_MIN : (double)-FLT_MAX;
-    double most = row->type == RL_I32 ? (double)INT32_MAX : (double)FLT_MAX;
-    char min[32], max[32];
-    rl_format_double(row->min, min);
-    rl_format_double(row->max, max);
-    if (row->min > least && row->max < most)
-        rl_str_printf(s, "%s … %s", min, max);
-    else if (row->min > least)
-        rl_str_printf(s, "≥ %s", min);
-    else if (row->max < most)
-        rl_str_printf(s, "≤ %s", max);
-}
-
-static void add_expected(const rl_param *row, rl_str *s)
-{
-    if (row->type == RL_I32 && row->words)
-        rl_str_printf(s, "%s or ", row->words);
-    rl_str_add(s, row->type == RL_I32    ? "an integer"
-                  : row->type == RL_RGBF ? "a number or a list of three, each"
-                                         : "a number");
-    size_t before = s->length;
-    rl_str_add(s, " ");
-    add_range(row, s);
-    if (s->length == before + 1 && s->text)
-        s->text[s->length = before] = 0;
-    if (row->unit && row->unit[0])
-        rl_str_printf(s, " (%s)", row->unit);
 }
 
 /* ---- reading
@@ -133,7 +86,7 @@ void rl_param_default(const rl_param *row, void *out)
 static rl_code wrong(const rl_param *row, const rl_value *v, rl_error *err)
 {
     rl_str expected = {0};
-    add_expected(row, &expected);
+    rl_param_expected(row, &expected);
     rl_code code = expected.failed ? rl_fail_memory(err, expected.length)
                                    : rl_value_wrong(v, row->name, rl_str_text(&expected), err);
     rl_str_free(&expected);
@@ -150,6 +103,9 @@ static bool fits(const rl_param *row, const rl_value *v)
 static rl_code read_int(const rl_param *row, const rl_value *v, void *out, rl_error *err)
 {
     int word = v->kind == RL_TEXT && row->words ? find_word(row->words, v->text) : -1;
+    if (v->kind == RL_NUMBER && fabs(v->number) > INT32_MAX &&
+        row->max >= INT32_MAX) /* a limit worth a word */
+        return rl_value_wrong(v, row->name, "an integer of at most 2147483647 (32 bits)", err);
     if (word < 0 && (!fits(row, v) || v->number != floor(v->number) || fabs(v->number) > INT32_MAX))
         return wrong(row, v, err);
     store_int(out, word >= 0 ? -1.0 - word : v->number);
@@ -207,6 +163,8 @@ rl_code rl_param_read(const rl_param *row, const rl_value *v, void *out, rl_erro
         break;
     case RL_ROWS:
         code = rl_list_read(row, v, out, err);
+        if (!code)
+            code = rl_list_check_sums(row, v, out, err);
         break;
     case RL_MATERIALS:
         memset(out, 0, rl_param_bytes(row)); /* rl_material_sets_fill, when the capture is known */
@@ -237,8 +195,11 @@ static rl_code unknown_key(rl_arena *arena, const rl_pass *pass, const char *nod
     for (size_t i = 0; i < n; i++)
         names[i] = pass->params.rows[i].name;
     char *text = rl_arena_printf(arena, "pass '%s' (%s) has no parameter '%s'", node, pass->name, entry->key);
-    /* A slip in `in` or `pass` gets its hint too, but only parameters are listed. */
+    /* A slip in `in` or `pass` gets its hint too, but only parameters are listed. Not so `taps`, which is two
+     * letters away from `pass`: more likely it is another pass's. */
     const char *other = rl_nearest(entry->key, names, n) ? NULL : rl_nearest(entry->key, also, n_also);
+    if (other && entry->key[0] != other[0])
+        other = NULL;
     if (text && other)
         text = rl_arena_printf(arena, "%s; did you mean '%s'?", text, other);
     else if (text && !n)
@@ -278,131 +239,22 @@ rl_code rl_params_read(rl_arena *arena, const rl_pass *pass, const char *node, c
     return RL_OK;
 }
 
-bool rl_step_runs(const rl_pass *pass, const rl_step *step, const void *params)
+static bool is_when(const rl_pass *pass, const void *params, const char *when, int32_t is)
 {
-    const rl_param *row = step->when ? find_row(pass->params, step->when) : NULL;
+    const rl_param *row = when ? find_row(pass->params, when) : NULL;
     int32_t v;
     if (!row)
         return true;
     memcpy(&v, (const char *)params + row->offset, sizeof v);
-    return v == step->is;
+    return v == is;
 }
 
-/* ---- telling
- * ------------------------------------------------------------------------------------------------- */
-
-static float load_float(const void *value, size_t i)
+bool rl_step_runs(const rl_pass *pass, const rl_step *step, const void *params)
 {
-    float v;
-    memcpy(&v, (const char *)value + i * sizeof v, sizeof v);
-    return v;
+    return is_when(pass, params, step->when, step->is);
 }
 
-/* By dense index: names belong to a capture's materials. */
-static void print_materials(const void *value, rl_str *s)
+bool rl_port_exists(const rl_pass *pass, const rl_port *port, const void *params)
 {
-    uint32_t words[RL_SET_WORDS];
-    const char *comma = "";
-    memcpy(words, value, sizeof words);
-    rl_str_add(s, "[");
-    for (unsigned i = 0; i < 32 * RL_SET_WORDS; i++) {
-        if (words[i / 32] >> i % 32 & 1) {
-            rl_str_printf(s, "%s%u", comma, i);
-            comma = ", ";
-        }
-    }
-    rl_str_add(s, "]");
-}
-
-void rl_param_print(const rl_param *row, const void *value, rl_str *s)
-{
-    char text[3][32];
-    int32_t v;
-    memcpy(&v, value, sizeof v);
-    switch (row->type) {
-    case RL_F32:
-        rl_str_add(s, rl_format_float(load_float(value, 0), text[0]));
-        break;
-    case RL_RGBF:
-        for (size_t i = 0; i < 3; i++)
-            rl_format_float(load_float(value, i), text[i]);
-        rl_str_printf(s, "[%s, %s, %s]", text[0], text[1], text[2]);
-        break;
-    case RL_BOOL:
-        rl_str_add(s, v ? "true" : "false");
-        break;
-    case RL_ENUM:
-        add_word(s, row->words, v);
-        break;
-    case RL_I32:
-        if (v >= 0 || !add_word(s, row->words, -1 - v))
-            rl_str_printf(s, "%d", (int)v);
-        break;
-    case RL_ROWS:
-        rl_list_print(row, value, s);
-        break;
-    case RL_MATERIALS:
-        print_materials(value, s);
-        break;
-    }
-}
-
-void rl_param_describe(const rl_param *row, rl_str *s)
-{
-    float value[RL_SET_WORDS];
-    const char *unit = row->unit && row->unit[0] ? row->unit : NULL;
-    size_t before = s->length;
-    if (row->type == RL_ROWS)
-        rl_list_expected(row, s);
-    else if (row->type == RL_MATERIALS)
-        rl_str_add(s, "a list of materials, stencil names or ids");
-    else if (row->type == RL_BOOL)
-        rl_str_add(s, "true|false");
-    else if (row->words)
-        rl_str_add(s, row->words);
-    if (row->type != RL_BOOL && row->type != RL_ENUM && row->type != RL_ROWS && row->type != RL_MATERIALS) {
-        if (s->length > before)
-            rl_str_add(s, "|");
-        size_t words = s->length;
-        add_range(row, s);
-        if (s->length == words)
-            rl_str_add(s, row->type == RL_I32 ? "an integer" : "a number");
-    }
-    if (row->no_default || row->required || row->type == RL_ROWS) {
-        rl_str_printf(s, "%s%s, %s", unit ? " " : "", unit ? unit : "",
-                      row->required ? "required" : "no default");
-        if (row->required_with)
-            rl_str_printf(s, ", required with %s", row->required_with);
-        return;
-    }
-    rl_str_add(s, ", default ");
-    rl_param_default(row, value);
-    rl_param_print(row, value, s);
-    if (unit)
-        rl_str_printf(s, " %s", unit);
-}
-
-void rl_param_field(const rl_param *row, const char *prefix, rl_str *s)
-{
-    bool real = row->type == RL_F32 || row->type == RL_RGBF;
-    if (row->type == RL_ROWS) {
-        rl_list_field(row, prefix, s);
-        return;
-    }
-    rl_str_printf(s, "%s %s%s%s;", real ? "float" : "int", prefix, row->name,
-                  row->type == RL_RGBF        ? "[3]"
-                  : row->type == RL_MATERIALS ? "[8]"
-                                              : "");
-}
-
-void rl_params_struct_text(rl_params params, const char *name, rl_str *s)
-{
-    if (!params.n)
-        return;
-    rl_str_printf(s, "typedef struct %s {", name);
-    for (size_t i = 0; i < params.n; i++) {
-        rl_str_add(s, " ");
-        rl_param_field(&params.rows[i], "", s);
-    }
-    rl_str_printf(s, " } %s;\n", name);
+    return is_when(pass, params, port->when, port->is);
 }

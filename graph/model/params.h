@@ -39,14 +39,19 @@ const void *rl_param_element(const rl_param *row, const void *value, size_t i, s
 /* Whether a value of an RL_ENUM row is one of the words "a|b". */
 bool rl_param_is(const rl_param *row, const void *value, const char *words);
 
-/* Whether a step of the pass runs with these parameters (the pass's struct; may be NULL when it has none). */
+/* Whether a step of the pass runs, and whether there is memory for a SCRATCH port, with these parameters (the
+ * pass's struct; may be NULL when it has none): their .when and .is. */
 bool rl_step_runs(const rl_pass *pass, const rl_step *step, const void *params);
+bool rl_port_exists(const rl_pass *pass, const rl_port *port, const void *params);
 
 /* A value as YAML text ("auto", "screen", "0.05", "[1, 0, 0]"), appended to s. */
 void rl_param_print(const rl_param *row, const void *value, rl_str *s);
 /* The row's range and default for people: "0 … 1, default 0.05 ratio", "screen|tangent, default screen",
  * "0 … 1 ratio, no default" for .no_default rows. */
 void rl_param_describe(const rl_param *row, rl_str *s);
+
+/* What may be given for a number, for an error that names the row: "auto or an integer 0 … 64 (taps)". */
+void rl_param_expected(const rl_param *row, rl_str *s);
 
 /* A row as a field of an OpenCL struct, "float blend;" or, with the prefix "profile_", "float
  * profile_weight[3];"; a list as its fields. */

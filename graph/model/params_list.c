@@ -116,6 +116,17 @@ static rl_code read_element(const rl_param *row, const rl_value *element, size_t
     return code;
 }
 
+/* Where a list went wrong as a whole: at the value that --set put into it, else where the list begins. */
+static rl_where changed_element(const rl_value *list, const char *key)
+{
+    for (size_t i = list->n; i-- > 0;) {
+        const rl_value *v = rl_value_get(list->items[i], key);
+        if (v && v->where.file && list->where.file && strcmp(v->where.file, list->where.file))
+            return v->where;
+    }
+    return list->where;
+}
+
 /* The elements of one key together, each channel. */
 static rl_code check_sum(const rl_param *row, const rl_value *v, size_t k, const void *value, rl_error *err)
 {
@@ -133,10 +144,11 @@ static rl_code check_sum(const rl_param *row, const rl_value *v, size_t k, const
     }
     if (!beyond)
         return RL_OK;
+    const rl_where where = changed_element(v, key->name);
     if (channels == 1)
-        return rl_fail(err, RL_E_CONFIG, v->where, "'%s': '%s' adds up to %.7g, at most %g is allowed",
+        return rl_fail(err, RL_E_CONFIG, where, "'%s': '%s' adds up to %.7g, at most %g is allowed",
                        row->name, key->name, sum[0], key->most_sum);
-    return rl_fail(err, RL_E_CONFIG, v->where,
+    return rl_fail(err, RL_E_CONFIG, where,
                    "'%s': '%s' adds up to [%.7g, %.7g, %.7g], at most %g a channel is allowed", row->name,
                    key->name, sum[0], sum[1], sum[2], key->most_sum);
 }
@@ -151,8 +163,14 @@ rl_code rl_list_read(const rl_param *row, const rl_value *v, void *out, rl_error
     rl_code code = RL_OK;
     for (size_t i = 0; !code && i < v->n; i++)
         code = read_element(row, v->items[i], i, out, err);
+    return code;
+}
+
+rl_code rl_list_check_sums(const rl_param *row, const rl_value *v, const void *value, rl_error *err)
+{
+    rl_code code = RL_OK;
     for (size_t k = 0; !code && k < row->list.n; k++)
         if (row->list.rows[k].most_sum > 0)
-            code = check_sum(row, v, k, out, err);
+            code = check_sum(row, v, k, value, err);
     return code;
 }

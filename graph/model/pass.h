@@ -181,14 +181,21 @@ typedef struct rl_port {
     bool optional;         /* READ: may be absent; the kernel sees NULL and HAS_NAME 0 */
     const char *if_absent; /* optional READ: what the pass does without it, said once in the log; NULL = not
                               worth a word */
+    const char *missed_by; /* optional READ: "transmission: thin|thick", a profile key of this pass and words
+                              of it; where a material's profile has one of them, and neither this port nor */
+    const char *instead;   /* this other one (or NULL) has an image, the log says */
+    const char *if_missed; /* what comes of it */
     const char
         *needed_by; /* optional READ: "diffuse: sg" is a shading key of this pass and a word of it; a material
                        with a profile and that word makes the port required (graph.h); NULL = none does */
     const char *without; /* SCRATCH: an optional port; there is memory only where nothing feeds that */
     const char *with;    /* SCRATCH: the REDUCTION port that it exists for; NULL = always */
-    const char *of;      /* HISTORY: the port (own output first, else own input) whose past this is */
-    rl_layout layout;    /* the layout that the kernel wants; the plan inserts the conversion */
-    bool any_layout;     /* WRITE: the kernel stores through RL_STORE, so the plan may choose (LAYOUT_NAME) */
+    const char
+        *when; /* SCRATCH: a structural parameter; there is memory only where it is .is; NULL = always */
+    int32_t is;
+    const char *of;   /* HISTORY: the port (own output first, else own input) whose past this is */
+    rl_layout layout; /* the layout that the kernel wants; the plan inserts the conversion */
+    bool any_layout;  /* WRITE: the kernel stores through RL_STORE, so the plan may choose (LAYOUT_NAME) */
 } rl_port;
 
 /* Whether a port makes an image of the graph. */

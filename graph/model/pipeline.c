@@ -215,6 +215,55 @@ static rl_code read_color(parser *q)
     return code;
 }
 
+/* ---- setting ---- */
+
+/* Which name of the path is not there, and what stands in its place. */
+static void warn_nothing(const rl_value *root, const char *path, rl_where where, const rl_log *log)
+{
+    enum { MOST = 64 };
+    const char *names[MOST], *rest = path;
+    const rl_value *map = root;
+    rl_str key = {0}, text = {0};
+    for (const rl_value *next = root; next; rest += strcspn(rest, ".") + 1) {
+        map = next;
+        key.length = 0;
+        rl_str_addn(&key, rest, strcspn(rest, "."));
+        next = rest[strcspn(rest, ".")] ? rl_value_get(map, rl_str_text(&key)) : NULL;
+    }
+    size_t n = 0;
+    for (; map->kind == RL_MAP && n < map->n && n < MOST; n++)
+        names[n] = map->entries[n].key;
+    rl_suggest(&text, rl_str_text(&key), names, n, "known");
+    if (!key.failed && !text.failed)
+        rl_report(log, RL_WARNING, where, "nothing is removed: there is no '%s'%s", path, rl_str_text(&text));
+    rl_str_free(&key);
+    rl_str_free(&text);
+}
+
+rl_code rl_pipeline_set(rl_arena *arena, rl_value **root, const char *path, rl_value *v, const rl_log *log,
+                        rl_error *err)
+{
+    const rl_value *lights = rl_value_get(*root, "lights");
+    bool removes = v->kind == RL_NULL, of_capture = !lights || lights->implied || lights->kind == RL_NULL;
+    if (removes && of_capture && !strncmp(path, "lights.", 7)) {
+        rl_value *stays = rl_arena_alloc(arena, sizeof *stays);
+        if (!stays)
+            return rl_fail_memory(err, sizeof *stays);
+        *stays = *v;
+        stays->kind = RL_TEXT; /* so that rl_value_set puts it there */
+        rl_code code = rl_value_set(arena, root, path, stays, err);
+        stays->kind = RL_NULL;
+        return code;
+    }
+    bool nothing = removes && !rl_value_at(*root, path);
+    rl_code code = rl_value_set(arena, root, path, v, err);
+    if (!code && nothing)
+        warn_nothing(*root, path, v->where, log);
+    return code;
+}
+
+/* ---- reading ---- */
+
 /* What the result depends on, as far as the pipeline says it. */
 static rl_code make_hash(parser *q)
 {

@@ -14,7 +14,7 @@ extern "C" {
 
 typedef struct rl_node_input {
     const char *port;
-    const char *image; /* as written: "light.diffuse", "capture.normal", "capture.shadow.key" */
+    const char *image; /* as written: "light.diffuse", "capture.normal", "capture.shadow.key", "none" */
     rl_where where;    /* of the image's name */
 } rl_node_input;
 
@@ -73,6 +73,12 @@ typedef struct rl_pipeline {
     const rl_output *outputs;
     size_t n_outputs;
 } rl_pipeline;
+
+/* --set on the tree of a pipeline: rl_value_set, and what removing (null) means here. Of lights that no file
+ * of the pipeline lists it removes the capture's, by a null that stays in the implied map until the two are
+ * merged. A path that leads to nothing is a warning with the nearest name (log may be NULL). */
+rl_code rl_pipeline_set(rl_arena *arena, rl_value **root, const char *path, rl_value *v, const rl_log *log,
+                        rl_error *err);
 
 /* Parses a merged tree. User kernels (`pass: kernel`) become descriptors in the arena; their .cl file is read
  * here. Unknown keys, passes, parameters, ports: an error with the nearest name. Does not look at image names

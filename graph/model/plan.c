@@ -167,7 +167,8 @@ static rl_code buffer_node(rl_planner *p, size_t place)
         const rl_image_plan *image = node->images[i] >= 0 ? &p->images[node->images[i]] : NULL;
         bound[i] = -1;
         if (port->role == RL_SCRATCH) {
-            if (!wants(p, node, port->with) || !is_without(node, port->without))
+            if (!wants(p, node, port->with) || !is_without(node, port->without) ||
+                !rl_port_exists(node->pass, port, node->params))
                 continue;
             const char *name = rl_arena_printf(p->arena, "%s.%s", node->name, port->name);
             if (!name)

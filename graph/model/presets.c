@@ -210,7 +210,7 @@ rl_code rl_manifest_bind(rl_arena *arena, rl_manifest *m, int pattern, const cha
                          const rl_channel *channels, size_t n, rl_error *err)
 {
     binder b = {.arena = arena, .m = m, .channels = channels, .n = n};
-    return bind_all(&b, pattern, file, true, err);
+    return bind_all(&b, pattern, file ? file : "", file != NULL, err);
 }
 
 /* ---- the folder of presets ---- */

@@ -360,7 +360,13 @@ rl_code rl_yaml_load(rl_arena *arena, const char *path, rl_value **out, rl_error
     rl_code code = rl_file_read(path, &text, &size, err);
     if (code)
         return code;
-    code = rl_yaml_parse(arena, text, size, path, out, err);
+    if (size > 4 && !memcmp(text, "\x76\x2f\x31\x01", 4)) /* the slip that is most likely */
+        code =
+            rl_fail_file(err, RL_E_CONFIG, path,
+                         "this is an OpenEXR file, not YAML (`relit init` prints a pipeline for a capture, "
+                         "`relit inspect` a manifest)");
+    else
+        code = rl_yaml_parse(arena, text, size, path, out, err);
     rl_free(text);
     return code;
 }

@@ -200,7 +200,7 @@ rl_code rl_grid_apply(rl_arena *arena, const rl_registry *registry, const rl_gri
         size_t choice = rl_grid_choice(grid, variant, i + 1);
         code = check_path(&a, v);
         if (!code)
-            code = rl_value_set(arena, root, v->path, v->values[choice], err);
+            code = rl_pipeline_set(arena, root, v->path, v->values[choice], NULL, err);
         if (!code)
             code = note_change(&a, v->path, v->texts[choice]);
     }

@@ -1,6 +1,6 @@
-/* The OpenCL device. device.c is the only file of the engine that calls cl*: passes supply data, the executor
- * decides what runs. One thread at a time may use a device and what belongs to it, except where it says
- * otherwise. */
+/* The OpenCL device. device*.c are the only files of the engine that call cl*: passes supply data, the
+ * executor decides what runs. One thread at a time may use a device and what belongs to it, except where it
+ * says otherwise. */
 #ifndef RL_RUN_DEVICE_H
 #define RL_RUN_DEVICE_H
 

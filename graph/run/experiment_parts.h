@@ -3,6 +3,7 @@
 #define RL_RUN_EXPERIMENT_PARTS_H
 
 #include "graph/model/graph_merge.h"
+#include "graph/run/batch.h"
 #include "graph/run/experiment.h"
 #include "graph/run/session.h"
 
@@ -65,5 +66,33 @@ rl_code rl_experiment_read_energy(const rl_experiment *experiment, size_t captur
 
 /* experiment_groups.c: groups, merged graphs and plans of a capture, in the sessions' sequences too. */
 rl_code rl_experiment_merge(rl_experiment *experiment, size_t capture, rl_error *err);
+
+/* A frame on its way through reading, kernels and writing, of all groups. */
+typedef struct rl_run_slot {
+    rl_frame *frames;  /* [groups] */
+    rl_loaded *loaded; /* [groups] */
+    rl_error error;    /* of any group */
+    bool skipped;
+} rl_run_slot;
+
+/* The run of one capture. */
+typedef struct rl_capture_run {
+    rl_experiment *x;
+    size_t capture;
+    rl_experiment_capture *c;
+    const rl_experiment_hooks *hooks;
+    rl_run_hooks notes; /* its stage and span, as sessions take them */
+    rl_run_summary *summary;
+    rl_run_slot slots[RL_MOST_IN_FLIGHT];
+    rl_span **spans;          /* [groups][steps] */
+    rl_scene_values **scenes; /* [groups][members] */
+    size_t done, total;
+    rl_arena arena;
+} rl_capture_run;
+
+/* experiment_write.c: the end of a frame, on the writing thread: its files are written, the hook gets files,
+ * images and energy of all variants or the frame's error (the hook's own becomes the frame's), the summary
+ * counts it. Releases the slot's frames. */
+void rl_experiment_write(rl_capture_run *run, size_t item, rl_run_slot *slot);
 
 #endif

@@ -1,5 +1,4 @@
-/* The frames of an experiment: read once a group, run in one plan a group, written and handed out a variant.
- */
+/* The frames of an experiment: read once a group, run in one plan a group; experiment_write.c ends them. */
 #include <string.h>
 
 #include "graph/base/alloc.h"
@@ -8,28 +7,7 @@
 #include "graph/run/experiment_parts.h"
 #include "graph/run/session_notes.h"
 
-typedef struct slot {
-    rl_frame *frames;  /* [groups] */
-    rl_loaded *loaded; /* [groups] */
-    rl_error error;    /* of any group */
-    bool skipped;
-} slot;
-
-typedef struct run_state {
-    rl_experiment *x;
-    size_t capture;
-    rl_experiment_capture *c;
-    const rl_experiment_hooks *hooks;
-    rl_run_hooks notes; /* its stage and span, as sessions take them */
-    rl_run_summary *summary;
-    slot slots[RL_MOST_IN_FLIGHT];
-    rl_span **spans;          /* [groups][steps] */
-    rl_scene_values **scenes; /* [groups][members] */
-    size_t done, total;
-    rl_arena arena;
-} run_state;
-
-static rl_sequence *leader_of(const run_state *r, size_t group, rl_session **session)
+static rl_sequence *leader_of(const rl_capture_run *r, size_t group, rl_session **session)
 {
     size_t leader = r->c->groups[group].members[0];
     *session = r->x->sessions[leader];
@@ -41,8 +19,8 @@ static rl_sequence *leader_of(const run_state *r, size_t group, rl_session **ses
 
 static void batch_load(void *ctx, size_t item, int index)
 {
-    run_state *r = ctx;
-    slot *s = &r->slots[index];
+    rl_capture_run *r = ctx;
+    rl_run_slot *s = &r->slots[index];
     s->error = (rl_error){0};
     s->skipped = false;
     for (size_t g = 0; g < r->c->n_groups; g++) {
@@ -84,7 +62,7 @@ static void add_times(rl_group *g, const rl_frame *f, const rl_span *spans)
     g->frames++;
 }
 
-static void run_group(run_state *r, size_t group, rl_frame *f, const rl_loaded *loaded)
+static void run_group(rl_capture_run *r, size_t group, rl_frame *f, const rl_loaded *loaded)
 {
     rl_group *g = &r->c->groups[group];
     rl_session *session;
@@ -107,8 +85,8 @@ static void run_group(run_state *r, size_t group, rl_frame *f, const rl_loaded *
 
 static void batch_run(void *ctx, size_t item, int index)
 {
-    run_state *r = ctx;
-    slot *s = &r->slots[index];
+    rl_capture_run *r = ctx;
+    rl_run_slot *s = &r->slots[index];
     (void)item;
     for (size_t g = 0; g < r->c->n_groups; g++) {
         rl_session *session;
@@ -127,174 +105,22 @@ static void batch_run(void *ctx, size_t item, int index)
     }
 }
 
-/* ---- writing, handing out -------------------------------------------------------------------------------
- */
-
-/* What is handed out of a frame, and what has to be unmapped after it. */
-typedef struct delivery {
-    rl_experiment_frame frame;
-    rl_compared_image (*images)[RL_COMPARED];
-    const char ***files;
-    size_t *n_files;
-    rl_memory **mapped;
-    size_t n_mapped;
-    rl_energy_ledger energy;
-    rl_arena arena;
-} delivery;
-
-static size_t group_of(const rl_experiment_capture *c, size_t variant)
-{
-    for (size_t g = 0; g < c->n_groups; g++)
-        for (size_t i = 0; i < c->groups[g].n; i++)
-            if (c->groups[g].members[i] == variant)
-                return g;
-    return 0;
-}
-
-static rl_code map_output(const run_state *r, delivery *d, const rl_frame *f, size_t variant, size_t hidden,
-                          size_t layer, rl_sink_image *out, rl_error *err)
-{
-    const rl_session *s = r->x->sessions[variant];
-    const rl_sequence *q = rl_experiment_sequence(r->x, variant, r->capture);
-    rl_memory *memory = NULL;
-    rl_code code = rl_session_map_image(
-        q, f, q->plan->outputs[q->first_output + s->n_outputs + hidden][layer], out, &memory, err);
-    if (memory)
-        d->mapped[d->n_mapped++] = memory;
-    return code;
-}
-
-static rl_code map_variant(const run_state *r, delivery *d, const rl_frame *f, size_t variant, rl_error *err)
-{
-    rl_code code = RL_OK;
-    for (size_t k = 0; k < RL_COMPARED && !code; k++) {
-        rl_sink_image image = {0};
-        code = map_output(r, d, f, variant, RL_HIDDEN_COMPARED + k, 0, &image, err);
-        if (code)
-            break;
-        d->images[variant][k] = (rl_compared_image){
-            .width = f->geometry.width, .height = f->geometry.height, .stride = image.stride};
-        for (size_t p = 0; p < 3; p++)
-            d->images[variant][k].plane[p] = image.pixels + p * image.plane;
-    }
-    return code;
-}
-
-static rl_code write_variant(run_state *r, delivery *d, rl_frame *f, size_t variant, rl_error *err)
-{
-    rl_session *s = r->x->sessions[variant];
-    rl_sequence *q = rl_experiment_sequence(r->x, variant, r->capture);
-    d->files[variant] = rl_arena_array(&d->arena, s->n_outputs + 1, sizeof **d->files);
-    if (!d->files[variant])
-        return rl_fail_memory(err, s->n_outputs * sizeof **d->files);
-    double start = rl_state_now();
-    rl_code code = RL_OK;
-    if (r->x->variants[variant].files)
-        code = rl_session_write_frame(s, q, f, &r->notes, &d->arena, d->files[variant], &d->n_files[variant],
-                                      err);
-    r->c->write_ns[variant] += 1e9 * (rl_state_now() - start);
-    return code;
-}
-
-static rl_code make_delivery(const run_state *r, delivery *d, rl_error *err)
-{
-    const size_t n = r->x->n;
-    d->images = rl_arena_array(&d->arena, n, sizeof *d->images);
-    d->files = rl_arena_array(&d->arena, n, sizeof *d->files);
-    d->n_files = rl_arena_array(&d->arena, n, sizeof *d->n_files);
-    d->mapped = rl_arena_array(&d->arena, RL_COMPARED * n + 1, sizeof(rl_memory *));
-    bool good = d->images && d->files && d->n_files && d->mapped;
-    return good ? RL_OK : rl_fail_memory(err, n * sizeof *d->images);
-}
-
-static rl_code deliver(run_state *r, slot *s, delivery *d, rl_error *err)
-{
-    rl_code code = s->error.code;
-    if (r->c->write_frames == 1 && !r->c->write_warm) {
-        memset(r->c->write_ns, 0, r->x->n * sizeof *r->c->write_ns);
-        r->c->write_frames = 0;
-        r->c->write_warm = true;
-    }
-    r->c->write_frames++;
-    for (size_t v = 0; v < r->x->n && !code; v++) {
-        rl_frame *f = &s->frames[group_of(r->c, v)];
-        code = write_variant(r, d, f, v, err);
-        if (!code)
-            code = map_variant(r, d, f, v, err);
-    }
-    for (size_t g = 0; g < r->c->n_groups && !code; g++)
-        code = rl_experiment_read_energy(r->x, r->capture, g, &s->frames[g], &d->energy, err);
-    d->frame.energy = d->energy.rows;
-    d->frame.n_energy = d->energy.n;
-    rl_sink_image stencil = {0};
-    if (!code)
-        code =
-            map_output(r, d, &s->frames[0], r->c->groups[0].members[0], RL_HIDDEN_REQUIRED, 1, &stencil, err);
-    d->frame.stencil = (const uint32_t *)(const void *)stencil.pixels;
-    d->frame.stencil_stride = stencil.stride;
-    return code;
-}
-
-static void count(run_state *r, const slot *s)
-{
-    r->done++;
-    r->summary->frames++;
-    r->summary->failed += s->error.code != RL_OK;
-    for (size_t g = 0; g < r->c->n_groups; g++) {
-        r->summary->nonfinite += s->frames[g].nonfinite;
-        r->summary->clamped += s->frames[g].clamped;
-        r->summary->clipped += s->frames[g].clipped;
-    }
-}
-
-static void batch_write(void *ctx, size_t item, int index)
-{
-    run_state *r = ctx;
-    slot *s = &r->slots[index];
-    const rl_frame *first = &s->frames[0];
-    delivery d = {.frame = {.capture = r->capture, .index = item, .frame = first->number}};
-    double start = rl_state_now();
-    rl_session_stage(&r->notes, RL_LANE_WRITE, first);
-    if (!s->error.code && !make_delivery(r, &d, &s->error))
-        deliver(r, s, &d, &s->error);
-    d.frame.error = &s->error;
-    d.frame.x = first->geometry.x;
-    d.frame.y = first->geometry.y;
-    d.frame.width = first->geometry.width;
-    d.frame.height = first->geometry.height;
-    d.frame.images = (const rl_compared_image(*)[RL_COMPARED])d.images;
-    d.frame.files = (const char *const *const *)d.files;
-    d.frame.n_files = d.n_files;
-    d.frame.done = r->done + 1;
-    d.frame.total = r->total;
-    if (s->skipped)
-        s->error = (rl_error){0};
-    else if (r->hooks && r->hooks->frame) {
-        rl_error own = {0};
-        if (r->hooks->frame(r->hooks->ctx, &d.frame, &own) && !s->error.code)
-            s->error = own;
-    }
-    for (size_t i = 0; i < d.n_mapped; i++)
-        rl_memory_unmap(d.mapped[i], NULL); /* what was read has been read */
-    rl_session_span(&r->notes, rl_experiment_sequence(r->x, 0, r->capture), first, RL_LANE_WRITE, "write",
-                    "write", start);
-    count(r, s);
-    for (size_t g = 0; g < r->c->n_groups; g++)
-        rl_frame_release(&s->frames[g]);
-    rl_energy_ledger_free(&d.energy);
-    rl_arena_free(&d.arena);
-}
-
 /* ---- a capture, all captures ----------------------------------------------------------------------------
  */
 
+static void batch_write(void *ctx, size_t item, int index)
+{
+    rl_capture_run *r = ctx;
+    rl_experiment_write(r, item, &r->slots[index]);
+}
+
 static int batch_stop(void *ctx)
 {
-    const run_state *r = ctx;
+    const rl_capture_run *r = ctx;
     return r->hooks && r->hooks->stop ? r->hooks->stop(r->hooks->ctx) : 0;
 }
 
-static rl_code make_room(run_state *r, rl_error *err)
+static rl_code make_room(rl_capture_run *r, rl_error *err)
 {
     const size_t n = r->c->n_groups;
     r->spans = rl_arena_array(&r->arena, n, sizeof *r->spans);
@@ -313,7 +139,7 @@ static rl_code make_room(run_state *r, rl_error *err)
     return good ? RL_OK : rl_fail_memory(err, n * sizeof(rl_frame));
 }
 
-static rl_code make_executors(run_state *r, rl_error *err)
+static rl_code make_executors(rl_capture_run *r, rl_error *err)
 {
     rl_experiment *x = r->x;
     rl_code code = RL_OK;
@@ -335,7 +161,7 @@ static rl_code make_executors(run_state *r, rl_error *err)
     return code;
 }
 
-static void free_frames(run_state *r)
+static void free_frames(rl_capture_run *r)
 {
     for (int i = 0; i < RL_MOST_IN_FLIGHT; i++)
         for (size_t g = 0; r->slots[i].frames && g < r->c->n_groups; g++)
@@ -349,16 +175,16 @@ static void free_frames(run_state *r)
 static rl_code run_capture(rl_experiment *x, size_t capture, const rl_experiment_hooks *hooks,
                            rl_run_summary *summary, size_t *done, size_t total, bool *stopped, rl_error *err)
 {
-    run_state *r = rl_calloc(1, sizeof *r);
+    rl_capture_run *r = rl_calloc(1, sizeof *r);
     if (!r)
         return rl_fail_memory(err, sizeof *r);
-    *r = (run_state){.x = x,
-                     .capture = capture,
-                     .c = &x->captures[capture],
-                     .hooks = hooks,
-                     .summary = summary,
-                     .done = *done,
-                     .total = total};
+    *r = (rl_capture_run){.x = x,
+                          .capture = capture,
+                          .c = &x->captures[capture],
+                          .hooks = hooks,
+                          .summary = summary,
+                          .done = *done,
+                          .total = total};
     if (hooks)
         r->notes = (rl_run_hooks){.stage = hooks->stage, .span = hooks->span, .ctx = hooks->ctx};
     const size_t n = rl_experiment_sequence(x, 0, capture)->frames.n;

@@ -6,6 +6,7 @@
 
 #include "graph/base/alloc.h"
 #include "graph/run/camera.h"
+#include "graph/run/color.h"
 #include "graph/run/reader_parts.h"
 
 /* ---- frames ----------------------------------------------------------------------------------------------
@@ -37,11 +38,11 @@ static rl_code add_binding(rl_reader *r, const rl_layer *layer, int buffer, int 
     b.is_depth = layer->id == RL_LAYER_DEPTH;
     b.is_stencil = layer->id == RL_LAYER_STENCIL;
     if (layer->colorspace && strcmp(layer->colorspace, r->setup.working)) {
-        const char *from = rl_ocio_space(r->setup.ocio, layer->colorspace);
-        rl_ocio_request request = {.from = layer->colorspace, .to = r->setup.working};
-        rl_code code = from && !strcmp(from, r->setup.working)
-                           ? RL_OK
-                           : rl_ocio_transform_new(r->setup.ocio, &request, &b.to_working, err);
+        const char *from;
+        rl_code code = rl_color_space(r->setup.ocio, layer->colorspace, layer->colorspace_where, &from, err);
+        rl_ocio_request request = {.from = from, .to = r->setup.working};
+        if (!code && strcmp(from, r->setup.working))
+            code = rl_ocio_transform_new(r->setup.ocio, &request, &b.to_working, err);
         if (code)
             return code;
     }

@@ -44,6 +44,7 @@ void rl_frame_free(rl_frame *frame);
 /* Where the planes of a layer's light come from, in the order of the planes. */
 typedef struct rl_light_planes {
     const rl_layer *const *layers; /* [n] */
+    const char *const *names; /* [n], of the lights, for files that hold the planes; the reader needs none */
     int n;
 } rl_light_planes;
 

@@ -128,14 +128,17 @@ rl_code rl_reader_check_ids(const rl_reader *r, const rl_frame *f, const rl_fram
     if (!u->pixels)
         return RL_OK;
     rl_str text = {0};
-    for (size_t i = 0; i < u->n; i++)
-        rl_str_printf(&text, "%s%u (%llu pixels)", i ? ", " : "", u->ids[i].id,
-                      (unsigned long long)u->ids[i].pixels);
+    for (size_t i = 0; i < u->n; i++) {
+        const char *name = rl_manifest_stencil_name(r->setup.manifest, u->ids[i].id);
+        rl_str_printf(&text, "%s%u%s%s%s (%llu pixel%s)", i ? ", " : "", u->ids[i].id, name ? " '" : "",
+                      name ? name : "", name ? "'" : "", (unsigned long long)u->ids[i].pixels,
+                      u->ids[i].pixels == 1 ? "" : "s");
+    }
     rl_code code =
         rl_fail_file(err, RL_E_DATA, f->files[f->main_file] ? rl_exr_path(f->files[f->main_file]) : "memory",
                      "frame %d: no material covers stencil id %s; add a material with 'stencil:', or "
-                     "'default: {}' for the rest (known: %zu materials)",
-                     f->number, rl_str_text(&text), r->setup.materials->count - 1);
+                     "'default: {}' for the rest",
+                     f->number, rl_str_text(&text));
     rl_str_free(&text);
     return code;
 }

@@ -21,27 +21,77 @@ static rl_code missing_channel(const rl_layer *layer, const rl_exr *file, const 
     return code;
 }
 
-/* The part that holds all channels of a layer. */
+static rl_code missing_part(const rl_layer *layer, const rl_exr *file, rl_error *err)
+{
+    enum { MOST = 64 };
+    const char *names[MOST];
+    rl_str text = {0};
+    int n = 0;
+    for (; n < rl_exr_parts(file) && n < MOST; n++)
+        names[n] = rl_exr_part_at(file, n)->name;
+    rl_suggest(&text, layer->part, names, (size_t)n, "the file has");
+    rl_code code = rl_fail_file(err, RL_E_FORMAT, rl_exr_path(file),
+                                "layer '%s' needs part '%s'%s (set layers.%s in capture.yaml)", layer->name,
+                                layer->part, rl_str_text(&text), layer->name);
+    rl_str_free(&text);
+    return code;
+}
+
+/* How many of a layer's channels a part has before the first that it lacks. */
+static int channels_found(const rl_layer *layer, const rl_exr_part *part)
+{
+    int have = 0;
+    while (have < layer->n_channels && rl_exr_channel_named(part, layer->channels[have]))
+        have++;
+    return have;
+}
+
+/* The part that holds all channels of a layer. Where several do, which one is meant is not for relit to
+ * guess: "R" is the red of a part's colour and the roughness of another. Deep ones count where there is no
+ * other. */
 rl_code rl_reader_find_part(const rl_layer *layer, const rl_exr *file, int *out, rl_error *err)
 {
-    int first = layer->part ? rl_exr_part_named(file, layer->part) : 0;
+    int first = layer->part ? rl_exr_part_named(file, layer->part) : 0, found = -1, deep = -1;
     if (first < 0)
-        return rl_fail_file(err, RL_E_FORMAT, rl_exr_path(file),
-                            "layer '%s' needs part '%s', which the file does not have", layer->name,
-                            layer->part);
+        return missing_part(layer, file, err);
     const char *missing = layer->channels[0];
     for (int p = first; p < (layer->part ? first + 1 : rl_exr_parts(file)); p++) {
-        int have = 0;
-        for (; have < layer->n_channels; have++)
-            if (!rl_exr_channel_named(rl_exr_part_at(file, p), layer->channels[have]))
-                break;
-        if (have == layer->n_channels) {
-            *out = p;
-            return RL_OK;
-        }
-        missing = have > 0 ? layer->channels[have] : missing;
+        const rl_exr_part *part = rl_exr_part_at(file, p);
+        int have = channels_found(layer, part);
+        if (have < layer->n_channels)
+            missing = have > 0 ? layer->channels[have] : missing;
+        else if (part->deep)
+            deep = p;
+        else if (found < 0)
+            found = p;
+        else
+            return rl_fail_file(err, RL_E_FORMAT, rl_exr_path(file),
+                                "layer '%s': channel '%s' is in the parts '%s' and '%s' (set "
+                                "layers.%s.part in capture.yaml)",
+                                layer->name, layer->channels[0], rl_exr_part_at(file, found)->name,
+                                part->name, layer->name);
     }
-    return missing_channel(layer, file, missing, err);
+    *out = found >= 0 ? found : deep;
+    return *out >= 0 ? RL_OK : missing_channel(layer, file, missing, err);
+}
+
+/* What the header says already about pixels that cannot be read. */
+static rl_code check_readable(const rl_layer *layer, const rl_exr *file, int index, rl_error *err)
+{
+    const rl_exr_part *part = rl_exr_part_at(file, index);
+    if (part->deep)
+        return rl_fail_file(err, RL_E_FORMAT, rl_exr_path(file),
+                            "layer '%s' is in deep data, which relit does not read: flatten it first",
+                            layer->name);
+    for (int i = 0; i < layer->n_channels; i++) {
+        const rl_exr_channel *c = rl_exr_channel_named(part, layer->channels[i]);
+        if (c->x_sampling != 1 || c->y_sampling != 1)
+            return rl_fail_file(err, RL_E_FORMAT, rl_exr_path(file),
+                                "layer '%s': channel '%s' has a sample every %d x %d pixels; relit needs one "
+                                "in each",
+                                layer->name, c->name, c->x_sampling, c->y_sampling);
+    }
+    return RL_OK;
 }
 
 /* ---- headers ---------------------------------------------------------------------------------------------
@@ -56,6 +106,19 @@ static bool number_attr(const rl_exr *file, int part, const char *name, int n, d
     return true;
 }
 
+/* Of the part that holds the depth, else of any part of the frame's files: some writers put what is common to
+ * all parts into the first alone. */
+static bool camera_attr(const rl_frame *f, const char *name, int n, double *out)
+{
+    if (number_attr(f->files[f->main_file], f->main_part, name, n, out))
+        return true;
+    for (int i = 0; i < RL_MOST_FILES; i++)
+        for (int p = 0; f->files[i] && p < rl_exr_parts(f->files[i]); p++)
+            if (number_attr(f->files[i], p, name, n, out))
+                return true;
+    return false;
+}
+
 static void read_lens(rl_reader *r, const rl_frame *f, int file_number, rl_camera_info *c)
 {
     const rl_exr *file = f->files[f->main_file];
@@ -68,7 +131,7 @@ static void read_lens(rl_reader *r, const rl_frame *f, int file_number, rl_camer
     c->pixel_aspect = (double)part->pixel_aspect;
     if (fov) {
         c->fov_x = *fov;
-    } else if (!number_attr(file, f->main_part, "camera:fovx", 1, &c->fov_x) && !r->said_window) {
+    } else if (!camera_attr(f, "camera:fovx", 1, &c->fov_x) && !r->said_window) {
         r->said_window = true;
         rl_report(
             r->setup.log, c->screen_width == 1 ? RL_WARNING : RL_VERBOSE,
@@ -81,7 +144,7 @@ static void read_lens(rl_reader *r, const rl_frame *f, int file_number, rl_camer
     }
     if (jitter) {
         memcpy(c->jitter, jitter, sizeof c->jitter);
-    } else if (!number_attr(file, f->main_part, "camera:jitter", 2, c->jitter) && !r->said_jitter) {
+    } else if (!camera_attr(f, "camera:jitter", 2, c->jitter) && !r->said_jitter) {
         r->said_jitter = true;
         rl_report(r->setup.log, RL_VERBOSE, (rl_where){.file = rl_exr_path(file)},
                   "no attribute camera:jitter: samples lie at the pixels' centres");
@@ -93,7 +156,10 @@ static rl_code read_camera(rl_reader *r, rl_frame *f, int file_number, rl_error 
     const rl_exr *file = f->files[f->main_file];
     double header[16];
     float header_f[16];
-    bool has = number_attr(file, f->main_part, "worldToCamera", 16, header);
+    bool has = camera_attr(f, "worldToCamera", 16, header);
+    if (!has && r->setup.manifest->camera.matrix_source == RL_SOURCE_HEADER)
+        return rl_fail_file(err, RL_E_FORMAT, rl_exr_path(file),
+                            "the file has no attribute worldToCamera; give camera.matrix in the manifest");
     for (int i = 0; i < 16 && has; i++)
         header_f[i] = (float)header[i];
     rl_camera_info c = {.display = {f->display_window.x0, f->display_window.y0,
@@ -126,6 +192,8 @@ static rl_code check_layers(rl_reader *r, rl_frame *f, rl_error *err)
         const rl_exr *file = f->files[layer->pattern];
         int part = 0;
         rl_code code = rl_reader_find_part(layer, file, &part, err);
+        if (!code)
+            code = check_readable(layer, file, part, err);
         if (code)
             return code;
         rl_exr_box w = rl_exr_part_at(file, part)->data_window;

@@ -44,23 +44,28 @@ static const rl_channel_data *find_channel(const rl_frame_data *d, const char *n
     return NULL;
 }
 
-static void copy_channel(const rl_channel_data *c, rl_frame *f, float *to, bool depth)
+/* Returns how many samples are NaN or, but for those of depths, infinite. */
+static uint64_t copy_channel(const rl_channel_data *c, const rl_frame *f, float *to, bool depth)
 {
+    uint64_t nonfinite = 0;
     for (int y = 0; y < f->geometry.height; y++) {
         const float *in = c->floats + (size_t)y * c->stride;
         float *out = to + (size_t)y * (size_t)f->geometry.stride;
         for (int x = 0; x < f->geometry.width; x++) {
             bool fine = isfinite(in[x]);
-            f->nonfinite += !fine && !(depth && isinf(in[x]));
+            nonfinite += !fine && !(depth && isinf(in[x]));
             out[x] = fine ? in[x] : 0.0f;
         }
     }
+    return nonfinite;
 }
 
-static rl_code copy_layer(const rl_reader *r, int binding, const rl_frame_data *d, rl_frame *f,
-                          rl_frame_maps *maps, rl_error *err)
+static rl_code copy_layer(rl_reader *r, int binding, const rl_frame_data *d, rl_frame *f, rl_frame_maps *maps,
+                          rl_error *err)
 {
     const rl_binding *b = &r->bindings[binding];
+    const bool depth = b->layer->id == RL_LAYER_DEPTH || b->layer->id == RL_LAYER_BACK_DEPTH;
+    uint64_t nonfinite = 0;
     for (int k = 0; k < b->layer->n_channels; k++) {
         const rl_channel_data *c = find_channel(d, b->layer->channels[k]);
         if (!c || (b->is_stencil ? !c->ids : !c->floats))
@@ -68,13 +73,14 @@ static rl_code copy_layer(const rl_reader *r, int binding, const rl_frame_data *
                            "layer '%s' needs channel '%s' as %s, which the frame in memory does not have",
                            b->layer->name, b->layer->channels[k], b->is_stencil ? "ids" : "floats");
         if (!b->is_stencil) {
-            copy_channel(c, f, maps->base[binding][k], b->is_depth);
+            nonfinite += copy_channel(c, f, maps->base[binding][k], depth);
             continue;
         }
         for (int y = 0; y < f->geometry.height; y++)
             memcpy(maps->base[binding][k] + (size_t)y * (size_t)f->geometry.stride,
                    c->ids + (size_t)y * c->stride, (size_t)f->geometry.width * sizeof *c->ids);
     }
+    rl_reader_count_nonfinite(r, f, binding, nonfinite, "memory");
     return RL_OK;
 }
 

@@ -15,7 +15,7 @@ typedef struct rl_binding {
     int buffer; /* of the plan */
     int plane;  /* its first plane there */
     int n;      /* planes that it fills */
-    bool is_stencil, is_depth;
+    bool is_stencil, is_depth, said_nonfinite;
     rl_ocio_transform *to_working; /* colours in another space; NULL: none needed */
 } rl_binding;
 
@@ -44,6 +44,10 @@ rl_code rl_reader_check_ids(const rl_reader *r, const rl_frame *f, const rl_fram
 
 /* reader_header.c: the part of the file that holds all channels of a layer. */
 rl_code rl_reader_find_part(const rl_layer *layer, const rl_exr *file, int *out, rl_error *err);
+
+/* reader_pixels.c: samples of a layer of the frame that were NaN or infinite. A layer's first ones are a
+ * warning. */
+void rl_reader_count_nonfinite(rl_reader *r, rl_frame *f, int binding, uint64_t count, const char *file);
 
 /* reader_pixels.c: what reading from files and from memory share. Map the planes, and make room for the
  * file's ids; convert all rows of a layer; unmap and give the frame's verdict (`code` is what happened

@@ -55,6 +55,20 @@ typedef struct group {
     int members[RL_MOST_BINDINGS], n;
 } group;
 
+/* Where to look: a layer's first frame that has any. The run's end says how many there were. */
+void rl_reader_count_nonfinite(rl_reader *r, rl_frame *f, int binding, uint64_t count, const char *file)
+{
+    rl_binding *b = &r->bindings[binding];
+    f->nonfinite += count;
+    if (!count || b->said_nonfinite)
+        return;
+    b->said_nonfinite = true;
+    rl_report(
+        r->setup.log, RL_WARNING, (rl_where){.file = file},
+        "layer '%s': %llu NaN or infinite sample%s in frame %d, taken for 0; later frames are only counted",
+        b->layer->name, (unsigned long long)count, count == 1 ? "" : "s", f->number);
+}
+
 static void convert_group(void *ctx, int part, int y0, int y1)
 {
     const group *g = ctx;
@@ -84,8 +98,13 @@ static rl_code read_group(group *g, rl_pool *pool, rl_error *err)
     }
     rl_exr_rows rows = {convert_group, g};
     rl_code code = rl_exr_read(g->f->files[g->file], g->part, planes, n, &rows, pool, err);
-    for (size_t i = 0; i < n; i++)
-        g->f->nonfinite += planes[i].nonfinite;
+    n = 0;
+    for (int i = 0; i < g->n; i++) {
+        uint64_t count = 0;
+        for (int k = 0; k < g->r->bindings[g->members[i]].layer->n_channels; k++)
+            count += planes[n++].nonfinite;
+        rl_reader_count_nonfinite(g->r, g->f, g->members[i], count, rl_exr_path(g->f->files[g->file]));
+    }
     return code;
 }
 

@@ -18,7 +18,7 @@ static rl_code apply_settings(rl_session *s, rl_value **root, rl_error *err)
             return rl_fail_memory(err, strlen(set->path));
         code = rl_yaml_parse(&s->arena, set->value, strlen(set->value), name, &v, err);
         if (!code)
-            code = rl_value_set(&s->arena, root, set->path, v, err);
+            code = rl_pipeline_set(&s->arena, root, set->path, v, s->log, err);
     }
     return code;
 }
@@ -30,6 +30,10 @@ static rl_code read_pipeline(rl_session *s, rl_error *err)
     rl_code code;
     if (o->pipeline_text)
         code = rl_yaml_parse(&s->arena, o->pipeline_text, strlen(o->pipeline_text), "pipeline", &root, err);
+    else if (o->pipeline && rl_path_is_folder(o->pipeline))
+        code =
+            rl_fail_file(err, RL_E_USAGE, o->pipeline,
+                         "this is a folder, not a pipeline (`relit init` prints a pipeline for a capture)");
     else if (o->pipeline)
         code = rl_config_load(&s->arena, o->pipeline, &root, err);
     else

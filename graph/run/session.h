@@ -108,6 +108,8 @@ rl_code rl_session_light_matrix(const rl_session *session, const char *space, rl
 
 /* session_lights.c: the active lights of a capture; what the kernels see of them at a frame. */
 rl_code rl_session_lights(rl_session *session, rl_sequence *sequence, rl_error *err);
+/* session_absent.c: notes and warnings about what the passes of the plan have to do without. */
+void rl_session_note_absent(const rl_session *session, const rl_sequence *sequence);
 void rl_session_light_values(const rl_sequence *sequence, const camera_t *camera, light_t *out);
 
 /* session_ambient.c: the pipeline's ambient light; reads its HDRI. */

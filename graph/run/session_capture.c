@@ -57,9 +57,8 @@ static rl_code find_preset(rl_session *s, const char *files, const char *presets
     if (!code && (!match.name || match.missing_required > 0))
         code = rl_fail_file(err, RL_E_CONFIG, path,
                             "no known preset fits the channels of this file%s%s%s%s; write a capture.yaml "
-                            "(`relit inspect %s` "
-                            "prints a start)",
-                            match.name ? " (the nearest, '" : "", match.name ? match.name : "",
+                            "(`relit inspect %s` prints a start)",
+                            match.name ? ": the nearest, '" : "", match.name ? match.name : "",
                             match.name ? "', misses " : "", match.name ? match.missing : "", files);
     *out = match.name;
     rl_exr_close(&file);
@@ -127,7 +126,7 @@ static rl_code choose_frames(rl_session *s, rl_sequence *q, rl_error *err)
         return RL_OK;
     rl_where where = {.file = "--frames"};
     rl_code code = rl_frames_parse(&s->arena, s->options.frames, where, &q->frames, err);
-    return code ? code : rl_frames_check(&q->manifest->frames, &q->frames, where, err);
+    return code ? code : rl_frames_check(&q->manifest->frames, q->manifest->name, &q->frames, where, err);
 }
 
 /* ---- materials and graph ---------------------------------------------------------------------------------
@@ -175,20 +174,6 @@ static rl_code list_layers(rl_session *s, const rl_sequence *q, rl_layer_info **
     return RL_OK;
 }
 
-/* Says, once a capture, what passes do without an input that they would like to have. */
-static void note_absent(const rl_session *s, const rl_sequence *q)
-{
-    for (size_t i = 0; i < q->plan->n_nodes; i++) {
-        const rl_graph_node *node = &q->graph->nodes[q->plan->nodes[i].node];
-        for (size_t p = 0; p < node->pass->ports.n; p++) {
-            const rl_port *port = &node->pass->ports.rows[p];
-            if (port->if_absent && node->images[p] < 0)
-                rl_report(s->log, RL_NOTE, node->where, "pass '%s' (%s): capture '%s' has no layer '%s': %s",
-                          node->name, node->pass->name, q->manifest->name, port->name, port->if_absent);
-        }
-    }
-}
-
 /* Image files other than EXR hold grey or colours. */
 static rl_code check_formats(const rl_session *s, const rl_graph *graph, rl_error *err)
 {
@@ -226,7 +211,7 @@ static rl_code make_plan(rl_session *s, rl_sequence *q, rl_error *err)
     if (!code)
         code = rl_plan_make(&s->arena, q->graph, &q->plan, err);
     if (!code)
-        note_absent(s, q);
+        rl_session_note_absent(s, q);
     return code;
 }
 
@@ -251,6 +236,25 @@ static uint64_t decode_bytes(const rl_frame *f, int threads)
     return most;
 }
 
+static bool meets(const int *crop, rl_exr_box b)
+{
+    return crop[0] <= b.x1 && b.x0 <= crop[0] + crop[2] - 1 && crop[1] <= b.y1 &&
+           b.y0 <= crop[1] + crop[3] - 1;
+}
+
+/* A region that has nothing of the image is a slip of the command line. One that a frame has no data for,
+ * though it is in its display window, is that frame's error. */
+static rl_code check_crop(const rl_session *s, const rl_frame *f, rl_error *err)
+{
+    const int *c = s->options.crop;
+    rl_exr_box d = f->display_window;
+    if (c[2] <= 0 || meets(c, d) || meets(c, f->data_window))
+        return RL_OK;
+    return rl_fail(err, RL_E_USAGE, RL_NOWHERE,
+                   "--crop %d,%d,%d,%d lies outside of the image, which is %d,%d,%d,%d", c[0], c[1], c[2],
+                   c[3], d.x0, d.y0, d.x1 - d.x0 + 1, d.y1 - d.y0 + 1);
+}
+
 /* The size of the first frame that can be opened; when none can, the error of the first. */
 static rl_code measure(const rl_session *s, rl_sequence *q, rl_error *err)
 {
@@ -259,6 +263,8 @@ static rl_code measure(const rl_session *s, rl_sequence *q, rl_error *err)
         rl_frame f = {.number = q->frames.numbers[i]};
         rl_error one = {0};
         rl_code code = rl_reader_open(q->reader, f.number, &f, &one);
+        if (!code)
+            code = check_crop(s, &f, &one);
         q->geometry = f.geometry;
         q->decode_bytes = code ? 0 : decode_bytes(&f, s->threads);
         rl_frame_free(&f);

@@ -164,8 +164,11 @@ static void add_required(rl_wanted *wanted)
                                              {"stencil", "capture.stencil", {0}}};
     static const rl_pass *const convert[2];
     static const void *const params[2];
-    *wanted = (rl_wanted){
-        .name = "required", .layers = layers, .convert = convert, .convert_params = params, .n_layers = 2};
+    *wanted = (rl_wanted){.name = "(coverage, ids)",
+                          .layers = layers,
+                          .convert = convert,
+                          .convert_params = params,
+                          .n_layers = 2};
 }
 
 rl_code rl_session_colors(rl_session *s, rl_error *err)

@@ -129,23 +129,65 @@ static rl_code lay_profiles(rl_session *s, rl_sequence *q, rl_error *err)
     return RL_OK;
 }
 
+/* rl_light_planes while they are filled. */
+typedef struct planes {
+    const rl_layer **layers;
+    const char **names;
+} planes;
+
+static rl_code make_planes(rl_session *s, size_t most, planes *made, rl_light_planes *out, rl_error *err)
+{
+    *made = (planes){rl_arena_array(&s->arena, most + 1, sizeof *made->layers),
+                     rl_arena_array(&s->arena, most + 1, sizeof *made->names)};
+    *out = (rl_light_planes){.layers = made->layers, .names = made->names};
+    return made->layers && made->names ? RL_OK : rl_fail_memory(err, most * sizeof *made->layers);
+}
+
+/* A light's layer becomes the next plane; its number, or -1 without a layer. */
+static int add_plane(planes *made, rl_light_planes *out, const rl_layer *layer, const rl_light_spec *spec)
+{
+    if (!layer)
+        return -1;
+    made->layers[out->n] = layer;
+    made->names[out->n] = spec->name;
+    return out->n++;
+}
+
 /* Finds what an active light needs of the capture. */
-static rl_code add_light(const rl_session *s, rl_sequence *q, const rl_light_spec *spec,
-                         const rl_layer **shadow, const rl_layer **thickness, rl_error *err)
+static rl_code add_light(const rl_session *s, rl_sequence *q, const rl_light_spec *spec, planes *shadow,
+                         planes *thickness, rl_error *err)
 {
     rl_active_light *a = &q->lights[q->n_lights++];
     a->spec = spec;
-    a->shadow_plane = a->thickness_plane = -1;
     q->setup.kinds |= spec->shadow == RL_SHADOW_SCREEN ? RL_LIGHTS_MARCH : 0;
     q->setup.kinds |= spec->type == RL_LIGHT_SPHERE || spec->type == RL_LIGHT_RECT ? RL_LIGHTS_AREA : 0;
     rl_code code = bind_shadow(s, q->manifest, a, err);
     if (!code)
         code = light_color(s, spec, a->to_working, err);
-    if (a->shadow)
-        shadow[a->shadow_plane = q->shadow.n++] = a->shadow;
-    if (a->thickness)
-        thickness[a->thickness_plane = q->thickness.n++] = a->thickness;
+    a->shadow_plane = add_plane(shadow, &q->shadow, a->shadow, spec);
+    a->thickness_plane = add_plane(thickness, &q->thickness, a->thickness, spec);
     return code;
+}
+
+/* A null in changes to the capture's lights that finds none of its name there. */
+static void warn_nothing(const rl_session *s, const rl_value *lights, const rl_manifest *m)
+{
+    const rl_value *written = m->lights_written;
+    const char *names[64];
+    size_t n = 0;
+    for (; written && n < written->n && n < 64; n++)
+        names[n] = written->entries[n].key;
+    for (size_t i = 0; i < lights->n; i++) {
+        const rl_entry *e = &lights->entries[i];
+        rl_str text = {0};
+        if (e->value->kind != RL_NULL || rl_value_get(written, e->key))
+            continue;
+        rl_suggest(&text, e->key, names, n, "known");
+        rl_report(s->log, RL_WARNING, e->value->where,
+                  "nothing is removed: the capture '%s' has no light '%s'%s", m->name, e->key,
+                  rl_str_text(&text));
+        rl_str_free(&text);
+    }
 }
 
 /* The pipeline's lights, else the capture's. Paths into lights that no file of the pipeline lists
@@ -156,7 +198,8 @@ static rl_code choose_lights(rl_session *s, const rl_manifest *m, rl_lights *out
     *out = m->lights;
     if (!lights)
         return RL_OK;
-    if (lights->implied && m->lights_written) {
+    if (lights->implied) { /* nulls in it remove */
+        warn_nothing(s, lights, m);
         lights = rl_value_merge(&s->arena, m->lights_written, (rl_value *)lights);
         if (!lights)
             return rl_fail_memory(err, sizeof *lights);
@@ -172,16 +215,17 @@ rl_code rl_session_lights(rl_session *s, rl_sequence *q, rl_error *err)
     q->lights = rl_arena_array(&s->arena, lights.n + 1, sizeof *q->lights);
     if (!code && !q->lights)
         code = rl_fail_memory(err, lights.n * sizeof *q->lights);
-    const rl_layer **shadow = rl_arena_array(&s->arena, lights.n + 1, sizeof *shadow);
-    const rl_layer **thickness = rl_arena_array(&s->arena, lights.n + 1, sizeof *thickness);
+    planes shadow, thickness;
     q->light_values = rl_arena_array(&s->arena, lights.n + 1, sizeof *q->light_values);
-    if (!code && (!shadow || !thickness || !q->light_values))
-        code = rl_fail_memory(err, lights.n * sizeof *shadow);
-    q->shadow.layers = shadow;
-    q->thickness.layers = thickness;
+    if (!code && !q->light_values)
+        code = rl_fail_memory(err, lights.n * sizeof *q->light_values);
+    if (!code)
+        code = make_planes(s, lights.n, &shadow, &q->shadow, err);
+    if (!code)
+        code = make_planes(s, lights.n, &thickness, &q->thickness, err);
     for (size_t i = 0; i < lights.n && !code; i++)
         if (lights.light[i].enabled)
-            code = add_light(s, q, &lights.light[i], shadow, thickness, err);
+            code = add_light(s, q, &lights.light[i], &shadow, &thickness, err);
     if (s->n_sky) {
         q->setup.kinds |= RL_LIGHTS_SKY;
         q->setup.sky = s->sky;

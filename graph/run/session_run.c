@@ -102,6 +102,8 @@ rl_code rl_session_map_image(const rl_sequence *q, const rl_frame *f, int buffer
     *memory = m;
     out->planes = b->planes;
     out->format = b->image >= 0 ? q->graph->images[b->image].format : RL_SCALAR;
+    if (out->format == RL_LIGHTS)
+        out->lights = (strcmp(b->name, "capture.shadow") ? &q->thickness : &q->shadow)->names;
     out->stride = (size_t)g->stride;
     out->plane = (size_t)g->plane;
     out->pixels = (const float *)p + RL_GUARD + (size_t)(g->y - g->origin_y) * (size_t)g->stride +

@@ -68,7 +68,7 @@ static rl_code crop_region(const rl_sink_frame *f, region *r, rl_error *err)
     return RL_OK;
 }
 
-/* Channel letters of DESIGN 3: R G B (A), X Y Z, V, ID. */
+/* Channel letters of DESIGN 3: R G B (A), X Y Z, V, ID. A plane a light has the light's name. */
 static const char *const *letters(rl_format format, int *n)
 {
     static const char *const rgb[] = {"R", "G", "B"}, *const xyz[] = {"X", "Y", "Z"}, *const v[] = {"V"},
@@ -124,7 +124,9 @@ static void add_image(channel_list *list, const rl_sink_image *image, rl_exr_pix
     const char *const *names = letters(image->format, &n);
     size_t at = (size_t)r->y0 * image->stride + (size_t)r->x0;
     for (int i = 0; i < image->planes; i++) {
-        const char *letter = i < n ? names[i] : rl_arena_printf(&list->arena, "V%d", i);
+        const char *letter = image->lights ? image->lights[i]
+                             : i < n       ? names[i]
+                                           : rl_arena_printf(&list->arena, "V%d", i);
         rl_exr_source s = {
             .stride = image->stride, .type = type, .floats = image->pixels + (size_t)i * image->plane + at};
         if (image->format == RL_ID) {

@@ -18,7 +18,8 @@ typedef struct rl_sink_image {
     const char *name; /* of the layer, "" for an output with one image */
     rl_format format;
     int planes;
-    const float *pixels; /* ids: their bits */
+    const char *const *lights; /* RL_LIGHTS: the name of each plane */
+    const float *pixels;       /* ids: their bits */
     size_t stride, plane;
 } rl_sink_image;
 

@@ -38,7 +38,7 @@ static rl_code set_values(const planner *p, rl_value **root)
             return rl_fail_memory(p->err, strlen(set->path));
         code = rl_yaml_parse(p->arena, set->value, strlen(set->value), name, &v, p->err);
         if (!code)
-            code = rl_value_set(p->arena, root, set->path, v, p->err);
+            code = rl_pipeline_set(p->arena, root, set->path, v, p->log, p->err);
     }
     return code;
 }

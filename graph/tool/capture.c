@@ -59,10 +59,11 @@ static rl_code find_bare(rl_arena *arena, const char *path, const char *presets,
         goto done;
     out->preset = match.name;
     out->missing = !match.name ? "every layer" : match.missing_required ? match.missing : NULL;
-    if (!out->missing)
-        code = rl_manifest_bare(arena, path, match.name, presets, log, &out->manifest, err);
-    if (!code && !out->missing)
-        code = rl_manifest_bind(arena, out->manifest, 0, first, channels, n, err);
+    if (match.name)
+        code = rl_manifest_bare(arena, path, match.name, presets, out->missing ? NULL : log, &out->manifest,
+                                err);
+    if (!code && match.name)
+        code = rl_manifest_bind(arena, out->manifest, 0, out->missing ? NULL : first, channels, n, err);
 done:
     rl_exr_close(&file);
     return code;

@@ -7,7 +7,7 @@
 
 /* A manifest and where it came from. Everything lives in the arena. */
 typedef struct rl_capture {
-    rl_manifest *manifest; /* of a bare file that no preset fits: files and frames, but no layers */
+    rl_manifest *manifest; /* of a bare file that no preset fits: files, frames, and the layers found */
     const char *file;      /* the manifest's file; NULL: it was guessed from channels */
     const char *preset;    /* of a bare file: the one that fits best, or NULL */
     const char *missing;   /* of a bare file: what the best preset does not find, or NULL */

@@ -2,7 +2,6 @@
  * overlapping as in a run; pictures go to a temporary folder. */
 #include <dirent.h>
 #include <errno.h>
-#include <jansson.h>
 #include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -15,6 +14,7 @@
 #include "graph/run/data_files.h"
 #include "graph/run/session.h"
 #include "graph/tool/enlarge.h"
+#include "graph/tool/json_print.h"
 #include "graph/tool/signals.h"
 #include "graph/tool/tool.h"
 
@@ -221,12 +221,7 @@ static void print_json(const rl_tool *tool, const bench *b, const rl_session *s,
                   s->threads, "width", b->width, "height", b->height, "frames", (int)b->frames,
                   "frames_per_s", (double)b->frames / b->wall_s, "ms_per_frame",
                   1e3 * b->wall_s / (double)b->frames, "peak_bytes", (json_int_t)b->peak, "stages", stages);
-    char *text = o ? json_dumps(o, JSON_COMPACT | JSON_REAL_PRECISION(6)) : NULL;
-    if (text)
-        rl_str_printf(out, "%s\n", text);
-    out->failed |= !text;
-    free(text);
-    json_decref(o);
+    rl_json_print(o, JSON_COMPACT | JSON_REAL_PRECISION(6), out);
 }
 
 int rl_cmd_bench(rl_tool *tool, rl_error *err)

@@ -1,9 +1,8 @@
 /* `relit devices`: what OpenCL offers, and which device a run would take. */
-#include <jansson.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "graph/run/device.h"
+#include "graph/tool/json_print.h"
 #include "graph/tool/tool.h"
 
 static bool same(const rl_device_info *a, const rl_device_info *b)
@@ -35,7 +34,7 @@ static json_t *as_json(const rl_device_info *d, size_t i, bool taken)
 static void print_all(const rl_tool *tool, const rl_device_info *all, size_t n, const rl_device_info *taken,
                       rl_str *out)
 {
-    json_t *list = json_array();
+    json_t *list = tool->args.json ? json_array() : NULL;
     bool found = false; /* of two that are alike, the first is taken */
     for (size_t i = 0; i < n; i++) {
         bool this = !found && taken && same(&all[i], taken);
@@ -45,15 +44,10 @@ static void print_all(const rl_tool *tool, const rl_device_info *all, size_t n, 
         else
             print_text(&all[i], i, this, out);
     }
-    char *text = tool->args.json ? json_dumps(list, JSON_INDENT(1)) : NULL;
-    if (text)
-        rl_str_printf(out, "%s\n", text);
-    else if (tool->args.json)
-        out->failed = true;
+    if (tool->args.json)
+        rl_json_print(list, JSON_INDENT(1), out);
     else
         rl_str_add(out, "\n* a run takes this one\n");
-    free(text);
-    json_decref(list);
 }
 
 int rl_cmd_devices(rl_tool *tool, rl_error *err)

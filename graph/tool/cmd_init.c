@@ -212,6 +212,27 @@ static bool is_name(const char *text)
     return text[0] && strchr(letters, text[0]) && !text[strspn(text, all)] && strcmp(text, "default");
 }
 
+/* The ids of the i-th name and of those behind it that are called the same: "6", "[6, 7]". */
+static void add_ids(rl_str *out, const rl_manifest *m, size_t i)
+{
+    rl_str ids = {0};
+    size_t n = 0;
+    for (size_t k = i; k < m->n_stencil_names; k++)
+        if (k == i || !strcmp(m->stencil_names[k].name, m->stencil_names[i].name))
+            rl_str_printf(&ids, "%s%lld", n++ ? ", " : "", (long long)m->stencil_names[k].id);
+    rl_str_printf(out, n > 1 ? "[%s]" : "%s", rl_str_text(&ids));
+    out->failed |= ids.failed;
+    rl_str_free(&ids);
+}
+
+static bool named_before(const rl_manifest *m, size_t i)
+{
+    for (size_t k = 0; k < i; k++)
+        if (!strcmp(m->stencil_names[k].name, m->stencil_names[i].name))
+            return true;
+    return false;
+}
+
 /* `ids`: those of the first frame, for a capture that names none. */
 static void add_materials(rl_str *out, const rl_manifest *m, const uint32_t *ids, size_t n_ids)
 {
@@ -222,14 +243,21 @@ static void add_materials(rl_str *out, const rl_manifest *m, const uint32_t *ids
         const char *name = m->stencil_names[i].name;
         long long id = (long long)m->stencil_names[i].id;
         const guess *g = guess_for(name);
+        if (named_before(m, i))
+            continue;
         rl_str_add(out, "  ");
         if (is_name(name))
             add_text(out, name);
         else
             rl_str_printf(out, "id-%lld", id);
-        rl_str_printf(out, ": {stencil: %lld}", id);
-        if (g)
-            rl_str_printf(out, "    # {stencil: %lld, profile: %s}", id, g->profile);
+        rl_str_add(out, ": {stencil: ");
+        add_ids(out, m, i);
+        rl_str_add(out, "}");
+        if (g) {
+            rl_str_add(out, "    # {stencil: ");
+            add_ids(out, m, i);
+            rl_str_printf(out, ", profile: %s}", g->profile);
+        }
         rl_str_add(out, "\n");
     }
     for (size_t i = 0; i < n_ids; i++)

@@ -88,6 +88,64 @@ static rl_code print_file(const char *path, rl_str *out, rl_error *err)
 /* ---- how relit would read it ----------------------------------------------------------------------------
  */
 
+/* What no preset has found, to be filled in. */
+static void print_gaps(const rl_manifest *m, rl_str *out)
+{
+    static const char *const forms[] = {
+        [RL_LAYER_ALBEDO] = "{channels: [?, ?, ?], colorspace: lin_rec709}",
+        [RL_LAYER_NORMAL] = "{channels: [?, ?, ?], space: world, encoding: signed}",
+        [RL_LAYER_DEPTH] = "{channels: [?], kind: planar, empty: 1e10}",
+        [RL_LAYER_STENCIL] = "{channels: [?]}",
+    };
+    for (size_t i = 0; i < sizeof forms / sizeof *forms; i++)
+        if (rl_layer_types[i].required && !rl_manifest_layer(m, rl_layer_types[i].name))
+            rl_str_printf(out, "  #%s: %s    # %s\n", rl_layer_types[i].name, forms[i],
+                          rl_layer_types[i].help);
+}
+
+/* The manifest; behind `layers:` those that it lacks. */
+static void print_with_gaps(const rl_manifest *m, rl_str *out)
+{
+    static const char head[] = "\nlayers:\n";
+    rl_str text = {0};
+    rl_manifest_print(m, &text);
+    const char *at = strstr(rl_str_text(&text), head);
+    size_t n = at ? (size_t)(at - rl_str_text(&text)) + sizeof head - 1 : text.length;
+    out->failed |= text.failed;
+    rl_str_addn(out, rl_str_text(&text), n);
+    print_gaps(m, out);
+    rl_str_add(out, rl_str_text(&text) + n);
+    rl_str_free(&text);
+}
+
+static bool has_attribute(const rl_exr *file, const char *name)
+{
+    rl_exr_value v;
+    for (int p = 0; p < rl_exr_parts(file); p++)
+        if (rl_exr_attr(file, p, name, &v))
+            return true;
+    return false;
+}
+
+/* Says what a guess takes from the header that is not there, above the manifest. */
+static rl_code print_camera_gaps(rl_arena *arena, const rl_manifest *m, rl_str *out, rl_error *err)
+{
+    rl_exr *file = NULL;
+    const char *first = rl_capture_first(arena, m, 0);
+    rl_code code = first ? rl_exr_open(first, 0, &file, err) : rl_fail_memory(err, 1);
+    if (code)
+        return code;
+    if (m->camera.matrix_source == RL_SOURCE_HEADER && !has_attribute(file, "worldToCamera"))
+        rl_str_add(out,
+                   "# the file has no attribute worldToCamera: give camera.matrix, 16 numbers, rows listed, "
+                   "for column\n# vectors\n");
+    if (m->camera.fov_source == RL_SOURCE_HEADER && !has_attribute(file, "camera:fovx"))
+        rl_str_add(out, "# the file has no attribute camera:fovx: give camera.fov_x, in degrees, if its "
+                        "screenWindowWidth is not\n# the true one\n");
+    rl_exr_close(&file);
+    return RL_OK;
+}
+
 /* A guessed manifest is to be saved beside the files: their names in it are without a folder. */
 static rl_code print_guess(rl_arena *arena, const rl_capture *capture, rl_str *out, rl_error *err)
 {
@@ -101,23 +159,26 @@ static rl_code print_guess(rl_arena *arena, const rl_capture *capture, rl_str *o
         patterns[i].path = rl_path_name(m.patterns[i].path);
     }
     m.patterns = patterns;
-    rl_str_printf(out, "# guessed by preset '%s': check units and spaces, then save it as %s/capture.yaml\n",
-                  capture->preset, folder);
-    rl_manifest_print(&m, out);
-    return RL_OK;
+    if (capture->missing)
+        rl_str_printf(
+            out,
+            "# no preset finds all that relit needs: %s missing%s%s%s\n"
+            "# to start from: fill in the channels (part: NAME too, where files have parts), take the # "
+            "away,\n# check units and spaces, then save it as %s/capture.yaml\n",
+            capture->missing, capture->preset ? " in '" : "", capture->preset ? capture->preset : "",
+            capture->preset ? "', which fits best" : "", folder);
+    else
+        rl_str_printf(out,
+                      "# guessed by preset '%s': check units and spaces, then save it as %s/capture.yaml\n",
+                      capture->preset, folder);
+    rl_code code = print_camera_gaps(arena, capture->manifest, out, err);
+    print_with_gaps(&m, out);
+    return code;
 }
 
 static rl_code print_mapping(rl_arena *arena, const rl_capture *capture, rl_str *out, rl_error *err)
 {
     rl_str_add(out, "\n");
-    if (capture->missing) {
-        rl_str_printf(out, "# no preset finds all that relit needs: %s missing", capture->missing);
-        if (capture->preset)
-            rl_str_printf(out, " in '%s', which fits best", capture->preset);
-        rl_str_add(out, "\n# write a capture.yaml that says which channels hold albedo, normal, depth and "
-                        "stencil\n");
-        return RL_OK;
-    }
     if (!capture->file)
         return print_guess(arena, capture, out, err);
     rl_str_printf(out, "# %s, as relit reads it\n", capture->file);

@@ -1,10 +1,9 @@
 /* `relit passes`: the passes of this build, printed from their tables. */
-#include <jansson.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "graph/model/graph.h"
 #include "graph/model/params.h"
+#include "graph/tool/json_print.h"
 #include "graph/tool/markdown.h"
 #include "graph/tool/tool.h"
 
@@ -211,18 +210,22 @@ static json_t *pass_json(const rl_pass *pass)
                      rows_json(pass->material_keys), "shading_keys", rows_json(pass->shading_keys));
 }
 
-static void print_json(const rl_pass *pass, rl_str *out)
+/* Without a table, and in the shape of those that have one. */
+static json_t *kernel_json(void)
 {
-    json_t *json = pass ? pass_json(pass) : json_array();
-    for (size_t i = 0; !pass && i < rl_pass_count(); i++)
+    return json_pack("{s:s, s:s, s:[], s:[], s:[], s:[], s:[], s:s}", "name", kernel_name, "help",
+                     kernel_help, "ports", "parameters", "profile_keys", "material_keys", "shading_keys",
+                     "keys", kernel_keys + strlen("\nkeys\n"));
+}
+
+static void print_json(const rl_pass *pass, bool kernel, rl_str *out)
+{
+    json_t *json = kernel ? kernel_json() : pass ? pass_json(pass) : json_array();
+    for (size_t i = 0; !pass && !kernel && i < rl_pass_count(); i++)
         json_array_append_new(json, pass_json(rl_pass_at(i)));
-    char *text = json_dumps(json, JSON_INDENT(1) | JSON_REAL_PRECISION(9));
-    if (text)
-        rl_str_printf(out, "%s\n", text);
-    else
-        out->failed = true;
-    free(text);
-    json_decref(json);
+    if (!pass && !kernel)
+        json_array_append_new(json, kernel_json());
+    rl_json_print(json, JSON_INDENT(1) | JSON_REAL_PRECISION(9), out);
 }
 
 static rl_code unknown(const rl_tool *tool, rl_error *err)
@@ -264,10 +267,10 @@ int rl_cmd_passes(rl_tool *tool, rl_error *err)
         rl_fail_file(err, RL_E_USAGE, "relit passes", "--json and --markdown exclude each other");
         return RL_EXIT_WRONG;
     }
-    if (kernel)
+    if (tool->args.json)
+        print_json(pass, kernel, &text);
+    else if (kernel)
         print_kernel(markdown, &text);
-    else if (tool->args.json)
-        print_json(pass, &text);
     else if (markdown && pass)
         rl_markdown_pass(pass, &text);
     else if (markdown)

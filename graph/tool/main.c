@@ -41,7 +41,8 @@ static const command commands[] = {
      rl_cmd_diff},
     {{"check", RL_CMD_CHECK, "PIPELINE", "validate everything without processing a pixel",
       "Reads the pipeline, opens the headers of the capture, makes the plan and\n"
-      "compiles the kernels. Writes nothing.\n"},
+      "compiles the kernels. Writes nothing.\n"
+      "--json prints an object with pipeline, ok, captures and errors, in either case.\n"},
      rl_cmd_check},
     {{"plan", RL_CMD_PLAN, "PIPELINE...", "show the graph: order, lifetimes, memory, culled passes",
       "With --vary, or with several pipelines: what the variants share when `relit ab`\n"
@@ -139,7 +140,9 @@ int rl_tool_main(int argc, char **argv, FILE *out, FILE *err)
     if (argc < 2) {
         rl_fail_file(&error, RL_E_USAGE, "relit", "needs a command, see `relit --help`");
         status = RL_EXIT_WRONG;
-    } else if (!strcmp(argv[1], "--help") || !strcmp(argv[1], "-h")) {
+    } else if (!strcmp(argv[1], "help") && argc > 2) {
+        status = run_command(&tool, &infos, 3, (char *[]){argv[0], argv[2], "--help"}, &error);
+    } else if (!strcmp(argv[1], "--help") || !strcmp(argv[1], "-h") || !strcmp(argv[1], "help")) {
         rl_help_overview(&infos, &text);
         status = rl_tool_print(&tool, &text, &error);
     } else if (!strcmp(argv[1], "--version")) {

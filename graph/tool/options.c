@@ -66,34 +66,28 @@ static rl_code take_region(const parser *p, const rl_option *o, const char *valu
     return RL_OK;
 }
 
-static rl_code take_shard(const parser *p, const rl_option *o, const char *value, int out[2])
+/* "2/8" at the '/', "64x48" at the 'x': two integers from 1 to `most`. */
+static rl_code take_pair(const parser *p, const rl_option *o, const char *value, char mark, int most,
+                         const char *expected, int out[2])
 {
-    size_t n = strcspn(value, "/");
-    long long part, parts;
+    size_t n = strcspn(value, (const char[]){mark, 0});
+    long long first, second;
     char *head = rl_arena_strndup(p->arena, value, n);
     if (!head)
         return rl_fail_memory(p->err, n);
-    if (value[n] != '/' || !rl_parse_int(head, &part) || !rl_parse_int(value + n + 1, &parts) || parts < 1 ||
-        parts > 1000000 || part < 1 || part > parts)
-        return wrong(p, o, "I/N with I from 1 to N, such as 2/8", value);
-    out[0] = (int)part;
-    out[1] = (int)parts;
+    if (value[n] != mark || !rl_parse_int(head, &first) || !rl_parse_int(value + n + 1, &second) ||
+        first < 1 || second < 1 || first > most || second > most)
+        return wrong(p, o, expected, value);
+    out[0] = (int)first;
+    out[1] = (int)second;
     return RL_OK;
 }
 
-static rl_code take_size(const parser *p, const rl_option *o, const char *value, int out[2])
+static rl_code take_shard(const parser *p, const rl_option *o, const char *value, int out[2])
 {
-    size_t n = strcspn(value, "x");
-    long long width, height;
-    char *head = rl_arena_strndup(p->arena, value, n);
-    if (!head)
-        return rl_fail_memory(p->err, n);
-    if (value[n] != 'x' || !rl_parse_int(head, &width) || !rl_parse_int(value + n + 1, &height) ||
-        width < 1 || height < 1 || width > 65536 || height > 65536)
-        return wrong(p, o, "WxH in pixels, such as 1920x1080", value);
-    out[0] = (int)width;
-    out[1] = (int)height;
-    return RL_OK;
+    const char *expected = "I/N with I from 1 to N, such as 2/8";
+    rl_code code = take_pair(p, o, value, '/', 1000000, expected, out);
+    return !code && out[0] > out[1] ? wrong(p, o, expected, value) : code;
 }
 
 static rl_code take_word(const parser *p, const rl_option *o, const char *value, int *out)
@@ -160,7 +154,7 @@ static rl_code take(const parser *p, const rl_option *o, const char *value)
     case RL_TAKES_REGION:
         return take_region(p, o, value, at);
     case RL_TAKES_SIZE:
-        return take_size(p, o, value, at);
+        return take_pair(p, o, value, 'x', 65536, "WxH in pixels, such as 1920x1080", at);
     case RL_TAKES_SHARD:
         return take_shard(p, o, value, at);
     default:

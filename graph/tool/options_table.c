@@ -100,7 +100,7 @@ const rl_option rl_options_table[] = {
      .help = "whose pixels report.html holds: a list of first,\n"
              "last, worst, all, none, and frames as in --frames;\n"
              "default: first,last,worst"},
-    {"trace", "F.json", RL_CMD_RUN | RL_CMD_AB | RL_CMD_PLAN, RL_TAKES_TEXT, AT(trace),
+    {"trace", "F.json", SHARED, RL_TAKES_TEXT, AT(trace),
      .help = "write what ran when, for ui.perfetto.dev or\n"
              "chrome://tracing; plan --format html: such a file,\n"
              "whose times the page shows"},

@@ -1,9 +1,8 @@
 /* The plan of several variants as JSON: an object a capture, each on its line. */
 #include <inttypes.h>
-#include <jansson.h>
 #include <stdio.h>
-#include <stdlib.h>
 
+#include "graph/tool/json_print.h"
 #include "graph/tool/plan_variants_parts.h"
 
 /* jansson passes NULL on when memory is out; rl_plan_variants_json looks once, at the end. */
@@ -95,12 +94,8 @@ rl_code rl_plan_variants_json(const rl_ab_plan *plan, const rl_experiment *e, rl
         put(o, "cost", cost_json(plan, e), &failed);
         put(o, "compare_bytes", json_integer((json_int_t)rl_variants_compare_bytes(plan, e, c)), &failed);
         put(o, "groups", groups, &failed);
-        char *text = failed ? NULL : json_dumps(o, JSON_COMPACT | JSON_REAL_PRECISION(6));
-        if (text)
-            rl_str_printf(out, "%s\n", text);
-        failed |= !text;
-        free(text);
-        json_decref(o);
+        rl_json_print(o, JSON_COMPACT | JSON_REAL_PRECISION(6), out);
+        failed |= out->failed;
     }
     if (err->code)
         return err->code;

@@ -133,15 +133,20 @@ static json_t *json_text(const char *text)
     return value;
 }
 
+json_t *rl_report_error_json(const rl_error *err)
+{
+    return json_pack("{s:s, s:o, s:i, s:i, s:o}", "code", rl_code_name(err->code), "file",
+                     json_text(err->file), "line", err->line, "column", err->column, "text",
+                     json_text(err->text));
+}
+
 static void frame_json(rl_reporter *r, const rl_frame_result *f)
 {
     json_t *files = json_array(), *error = json_null();
     for (size_t i = 0; i < f->n_files; i++)
         json_array_append_new(files, json_text(f->files[i]));
     if (f->error && f->error->code)
-        error = json_pack("{s:s, s:o, s:i, s:i, s:o}", "code", rl_code_name(f->error->code), "file",
-                          json_text(f->error->file), "line", f->error->line, "column", f->error->column,
-                          "text", json_text(f->error->text));
+        error = rl_report_error_json(f->error);
     json_t *object =
         json_pack("{s:o, s:I, s:b, s:o, s:o}", "capture", json_text(f->capture), "frame",
                   (json_int_t)f->frame, "ok", !(f->error && f->error->code), "files", files, "error", error);

@@ -38,6 +38,9 @@ void rl_reporter_end(rl_reporter *r);
 
 /* "file:line:column: error: text". */
 void rl_report_error(rl_reporter *r, const rl_error *err);
+/* {"code", "file", "line", "column", "text"}; NULL when memory is out. */
+struct json_t;
+struct json_t *rl_report_error_json(const rl_error *err);
 /* A command's result, on stdout, all of it or an error: a full disk must not end with status 0. */
 rl_code rl_report_result(rl_reporter *r, const char *text, rl_error *err);
 
