@@ -134,9 +134,9 @@ typedef struct rl_frame_result {
     size_t done, total; /* frames of the whole run, this one included */
 } rl_frame_result;
 
-/* What took which time: a stage of a frame (category "read", "run", "write", "checkpoint"), an output that
- * was written
- * ("encode"), or a step on the device ("kernel", "colour", "convert", "copy"). */
+/* What took which time: a stage of a frame (category "read", "run", "write"), within "write" an output that
+ * was encoded ("encode"), a checkpoint that was written ("checkpoint") and what `frame` of an experiment did
+ * with the pictures ("compare"), or a step on the device ("kernel", "colour", "convert", "copy"). */
 typedef enum rl_lane { RL_LANE_READ, RL_LANE_RUN, RL_LANE_DEVICE, RL_LANE_WRITE, RL_LANES } rl_lane;
 
 typedef struct rl_run_span {
@@ -160,6 +160,7 @@ typedef struct rl_run_summary {
     size_t frames, failed;
     size_t skipped; /* frames that a resumed run found done */
     bool lacking;   /* the shard before this one has not handed over its history yet: nothing was written */
+    bool stuck;     /* this shard could not hand over its own: all else was written */
     uint64_t nonfinite, clamped, clipped;
     size_t peak_bytes; /* the most that relit had allocated, device buffers included */
 } rl_run_summary;

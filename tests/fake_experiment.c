@@ -34,7 +34,7 @@ rl_experiment *fake_experiment_new(size_t captures)
         e->sequences[c].manifest = &e->manifests[c];
         e->sequences[c].frames = (rl_frames){e->frames, FAKE_FRAMES};
     }
-    e->pipeline.hash = 0x0123456789abcdefull;
+    e->session.content = 0x0123456789abcdefu;
     e->session.pipeline = &e->pipeline;
     e->session.sequences = e->sequences;
     e->session.n_sequences = captures;

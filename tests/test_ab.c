@@ -528,6 +528,8 @@ static void test_json(void **state)
     size_t size;
     char *text = file_read(trace, &size);
     expect_in(text, "sss@2");
+    expect_in(text, "\"name\":\"taps_4/beauty\"");
+    expect_in(text, "\"cat\":\"compare\"");
     free(text);
     free(trace);
     tool_result_free(&r);

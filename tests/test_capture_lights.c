@@ -91,6 +91,7 @@ static void test_paths(void **state)
         {{{"lights.rim.enabled", "true"}}, 1, SCENE_LIGHTS},
         {{{"lights.rim", "null"}}, 1, SCENE_LIGHTS & ~SCENE_RIM},
         {{{"lights.key.efficacy", "100"}, {"lights.rim", "null"}}, 2, SCENE_LIGHTS & ~SCENE_RIM},
+        {{{"lights.rim.exposure", "1"}, {"lights.rim", "null"}}, 2, SCENE_LIGHTS & ~SCENE_RIM},
         {{{"lights.rim.efficacy", "null"}}, 1, SCENE_LIGHTS},
         {{{"lights", "{}"}}, 1, 0}};
     static const char *const color[] = {"c.color"};

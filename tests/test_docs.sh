@@ -16,7 +16,7 @@ status=$?
 report "$status" "passes/README.md is up to date (else: make docs)"
 
 lost=0
-for page in README.md passes/README.md configs/README.md; do
+for page in README.md .github/CONTRIBUTING.md passes/README.md configs/README.md configs/captures.md configs/farm/README.md; do
     while IFS= read -r link; do
         [ -e "$(dirname "$page")/$link" ] || { echo "# $page: no file '$link'"; lost=1; }
     done < <(grep -o '](\([^)#]*\))' "$page" | sed 's/^](//; s/)$//' | grep -v '^https\?:' | sort -u)

@@ -22,6 +22,7 @@
 #include "graph/base/alloc.h"
 #include "graph/run/device.h"
 #include "graph/run/image_file.h"
+#include "tests/count_cl.h"
 #include "tests/small_capture.h"
 #include "tests/tool_run.h"
 
@@ -63,6 +64,10 @@ static small_run run_armed(unsigned long (*arm)(unsigned long), unsigned long n)
     arm(n);
     small_run r = small_run_once(folder, out);
     arm(0);
+    for (int k = 0; k < COUNT_CL_KINDS; k++)
+        if (count_cl_live((count_cl_kind)k))
+            fail_msg("call %lu: %ld %s are left", n, count_cl_live((count_cl_kind)k),
+                     count_cl_name((count_cl_kind)k));
     int files = small_check_files(out);
     assert_true(files >= r.good * SMALL_OUTPUTS);
     forget(out);
@@ -95,6 +100,8 @@ static void try_all(unsigned long (*arm)(unsigned long), rl_code expected, int m
             assert_true(r.bad <= 1);
         }
     }
+    for (int k = 0; k < COUNT_CL_KINDS; k++)
+        assert_true(count_cl_made((count_cl_kind)k) > 10);
     print_message("%lu calls, step %lu: %lu runs failed\n", total, step, failed);
     assert_true(failed > 5 && seen > 5); /* the injection works */
     r = run_armed(arm, 0);               /* and nothing stays broken */

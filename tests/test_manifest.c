@@ -236,7 +236,7 @@ static void test_bad(void **state)
         {"unit: -1\n", "1:7: error: 'unit' is -1: out of range, above 0"},
         {"camera: {forwards: -z}\n",
          "1:10: error: camera has no key 'forwards'; did you mean 'forward'? known: "
-         "forward, fov_x, jitter, matrix"},
+         "forward, fov_x, jitter, matrix, shift"},
         {"camera: {forward: z}\n", "1:19: error: 'forward' cannot be 'z'; did you mean '-z'? known: "
                                    "+z, -z"},
         {"camera: {fov_x: 180}\n", "1:17: error: 'fov_x' is 180: out of range, 0.001 to 179.9"},
@@ -271,9 +271,10 @@ static void test_bad(void **state)
          "2:26: error: stencil_names: the id 0x1 is named twice"},
         {"preset: blander\n",
          "1:9: error: there is no preset 'blander'; did you mean 'blender'? known: arnold, "
-         "blender, relit"},
+         "arnold_cryptomatte, blender, blender_cryptomatte, pbrt, relit, unreal, vray"},
         {"preset: ../presets/blender\n",
-         "1:9: error: there is no preset '../presets/blender'; known: arnold, blender, relit"},
+         "1:9: error: there is no preset '../presets/blender'; known: arnold, arnold_cryptomatte, blender, "
+         "blender_cryptomatte, pbrt, relit, unreal, vray"},
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++)
         refuse(with("%s%s", rows[i].text, layers), with("shots/capture.yaml:%s", rows[i].expected));
@@ -376,7 +377,8 @@ static void test_camera(void **state)
     assert_true(rl_manifest_jitter(m, 1)[1] == -0.5 && rl_manifest_jitter(m, 2)[0] == 0);
     assert_int_equal(rl_manifest_view(m, 1, NULL, out, &err), RL_E_FORMAT);
     assert_message("shots/capture.yaml:4:9: error: frame 1: the file has no attribute worldToCamera; give "
-                   "camera.matrix");
+                   "camera.matrix: 16 numbers, world to camera, rows listed, for column vectors (how to get "
+                   "them: configs/captures.md)");
     float scaled[16], transposed[16];
     for (int i = 0; i < 16; i++) {
         scaled[i] = i < 12 ? header[i] * 0.01f : header[i];

@@ -182,6 +182,7 @@ static void test_header(void **state)
         assert_true(rl_exr_attr(f, 0, "owner", &v) && !strcmp(v.text, "the test"));
         assert_true(rl_exr_attr(f, 0, "relit:version", &v) && !strcmp(v.text, RL_VERSION));
         assert_true(rl_exr_attr(f, 0, "relit:pipeline", &v) && strlen(v.text) > 17);
+        assert_true(rl_exr_attr(f, 0, "relit:capture", &v) && strlen(v.text) > 17);
         assert_true(p->data_window.x0 == -9 && p->data_window.y0 == 5 && p->data_window.x1 == 40 &&
                     p->data_window.y1 == 34);
         assert_true(p->display_window.x0 == 0 && p->display_window.x1 == 71 && p->display_window.y1 == 47);

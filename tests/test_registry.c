@@ -35,7 +35,8 @@ static void test_texts(void **state)
         const rl_pass *p = rl_pass_at(i);
         assert_non_null(p->name);
         check_help(p->name, "pass", p->help);
-        assert_true(p->source && strlen(p->source) > 3);
+        if (!p->source || strlen(p->source) <= 3)
+            fail_msg("%s: no .source: which paper or program it is from", p->name);
         assert_true(strspn(p->name, "abcdefghijklmnopqrstuvwxyz0123456789_") == strlen(p->name));
         assert_ptr_equal(rl_pass_find(p->name), p); /* so names differ, too */
         assert_string_not_equal(p->name, "kernel"); /* stands for a user's own */
@@ -121,7 +122,8 @@ static void test_params(void **state)
                              bytes); /* in order, without gaps: as OpenCL lays it out */
             bytes += RL_PARAM_BYTES(p->params.rows[k].type);
         }
-        assert_int_equal(p->params_size, bytes);
+        if (p->params_size != bytes)
+            fail_msg("%s: .params_size is %zu, but its rows take %zu bytes", p->name, p->params_size, bytes);
         check_unique(p->name, p->params);
         const rl_params groups[] = {p->profile_keys, p->material_keys, p->shading_keys};
         for (int g = 0; g < 3; g++) {

@@ -9,9 +9,14 @@
 #include <jansson.h>
 #include <limits.h>
 #include <math.h>
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <time.h>
+#include <unistd.h>
 
 #include "graph/run/exr.h"
 #include "graph/run/schedule.h"
@@ -172,6 +177,79 @@ static void test_lacking(void **state)
     free(out);
 }
 
+/* A part whose history cannot be written has not done all of it: the next one would wait for ever. */
+static void test_no_hand_over(void **state)
+{
+    (void)state;
+    char *out = path_in(place.folder, "stuck"), *notes = path_in(out, ".relit"),
+         *taken = path_in(notes, "loop.0004.checkpoint"), *inside = path_in(taken, "x");
+    /* A folder has the checkpoint's name. */
+    assert_int_equal(mkdir(out, 0777) | mkdir(notes, 0777) | mkdir(taken, 0777) | mkdir(inside, 0777), 0);
+    for (int i = 0; i < 2; i++) {
+        tool_result r = BATCH(&place, "stuck", 1, "--shard", "1/3", i ? "--resume" : "--quiet");
+        assert_non_null(
+            strstr(r.err, "loop.0004.checkpoint: error: the next shard cannot go on from here: "));
+        assert_int_equal(folder_files(out), 4);
+        tool_result_free(&r);
+    }
+    assert_int_equal(rmdir(inside) | rmdir(taken), 0);
+    tool_result r = BATCH(&place, "stuck", 0, "--shard", "1/3", "--resume");
+    assert_non_null(strstr(r.err, "4 frames are there already"));
+    tool_result_free(&r);
+    assert_int_equal(batch_notes(&place, "stuck", "loop.0004.checkpoint"), 1);
+    shard("stuck", "2/3", NULL);
+    shard("stuck", "3/3", NULL);
+    batch_assert_same(&place, "plain", "stuck");
+    free(inside);
+    free(taken);
+    free(notes);
+    free(out);
+}
+
+/* Each part is killed or stopped at some moment, and started again, until all are through. */
+static void test_killed(void **state)
+{
+    (void)state;
+    static const char *const parts[] = {"1/3", "2/3", "3/3"};
+    static const int signals[] = {SIGKILL, SIGTERM, SIGKILL, SIGINT};
+    uint32_t random = 20261122;
+    int kills = 0;
+    struct timespec begin, end;
+    clock_gettime(CLOCK_MONOTONIC, &begin);
+    shard("timed", "1/3", NULL);
+    clock_gettime(CLOCK_MONOTONIC, &end);
+    /* ns; a process's start comes on top of a part */
+    long whole = (end.tv_sec - begin.tv_sec) * 1000000000L + end.tv_nsec - begin.tv_nsec;
+    for (int i = 0, tries = 0; i < 3; tries++) {
+        pid_t pid = batch_start(&place, "killed",
+                                (const char *const[]){"--quiet", "--resume", "--shard", parts[i],
+                                                      "--checkpoint-frames", "1", NULL});
+        random = random * 1664525u + 1013904223u;
+        long pause = (long)((double)whole * (random >> 8) / (1 << 24) * (tries ? 1 : 0.3));
+        if (tries < 6)
+            nanosleep(&(struct timespec){pause / 1000000000L, pause % 1000000000L}, NULL);
+        else
+            tries = -1; /* whatever the machine's speed: let one go through */
+        int status = 0, number = signals[random >> 16 & 3];
+        if (tries >= 0)
+            kill(pid, number);
+        assert_int_equal(waitpid(pid, &status, 0), pid);
+        bool through = WIFEXITED(status) && WEXITSTATUS(status) == 0;
+        bool stopped = (WIFSIGNALED(status) && WTERMSIG(status) == number) ||
+                       (WIFEXITED(status) && WEXITSTATUS(status) == 128 + number);
+        assert_true(through || stopped);
+        kills += stopped;
+        i += through;
+        tries = through ? -1 : tries;
+    }
+    assert_true(kills > 0);
+    batch_assert_same(&place, "plain", "killed");
+    assert_int_equal(batch_notes(&place, "killed", ".tmp"), 0);
+    tool_result r = BATCH(&place, "killed", 0, "--resume", "--json"); /* nothing is left to be done */
+    assert_string_equal(r.out, "");
+    tool_result_free(&r);
+}
+
 /* Two captures and two parts: one each; no hand-over. Without history no part waits for another. */
 static void test_several(void **state)
 {
@@ -308,8 +386,10 @@ int main(int argc, char **argv)
 {
     tool_child(argc, argv);
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_parts),   cmocka_unit_test(test_schedule), cmocka_unit_test(test_equal_one_run),
-        cmocka_unit_test(test_lacking), cmocka_unit_test(test_several),  cmocka_unit_test(test_warm_up),
+        cmocka_unit_test(test_parts),         cmocka_unit_test(test_schedule),
+        cmocka_unit_test(test_equal_one_run), cmocka_unit_test(test_lacking),
+        cmocka_unit_test(test_no_hand_over),  cmocka_unit_test(test_killed),
+        cmocka_unit_test(test_several),       cmocka_unit_test(test_warm_up),
         cmocka_unit_test(test_plan),
     };
     return cmocka_run_group_tests_name("shard", tests, setup, teardown);

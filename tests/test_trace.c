@@ -37,12 +37,20 @@ typedef struct event {
     int lane, frame;
 } event;
 
+static const char *capture = "loop";
+static bool lanes[8]; /* those that have been given a name */
+
 static bool read_event(json_t *o, event *e)
 {
     const char *kind = json_string_value(json_object_get(o, "ph"));
     assert_non_null(kind);
-    if (!strcmp(kind, "M"))
+    assert_int_equal(json_integer_value(json_object_get(o, "pid")), 1);
+    if (!strcmp(kind, "M")) {
+        size_t tid = (size_t)json_integer_value(json_object_get(o, "tid")); /* the process has none: 0 */
+        assert_true(tid < 8 && json_is_string(json_object_get(json_object_get(o, "args"), "name")));
+        lanes[tid] = true;
         return false;
+    }
     assert_string_equal(kind, "X");
     *e = (event){.category = json_string_value(json_object_get(o, "cat")),
                  .name = json_string_value(json_object_get(o, "name")),
@@ -50,8 +58,8 @@ static bool read_event(json_t *o, event *e)
                  .lane = (int)json_integer_value(json_object_get(o, "tid")),
                  .frame = (int)json_integer_value(json_object_get(json_object_get(o, "args"), "frame"))};
     e->end = e->begin + json_number_value(json_object_get(o, "dur"));
-    assert_true(e->category && e->name && e->begin >= 0 && e->end >= e->begin);
-    assert_string_equal(json_string_value(json_object_get(json_object_get(o, "args"), "capture")), "loop");
+    assert_true(e->category && e->name && e->begin >= 0 && e->end >= e->begin && lanes[e->lane]);
+    assert_string_equal(json_string_value(json_object_get(json_object_get(o, "args"), "capture")), capture);
     return true;
 }
 
@@ -65,8 +73,12 @@ static json_t *load(const char *path, event *events, int most, int *n)
     json_t *list = json_object_get(root, "traceEvents");
     assert_true(json_is_array(list));
     *n = 0;
+    memset(lanes, 0, sizeof lanes);
     for (size_t i = 0; i < json_array_size(list) && *n < most; i++)
         *n += read_event(json_array_get(list, i), &events[*n]);
+    /* As viewers want them, which make a stack of each thread: by time, what holds others first. */
+    for (int i = 1; i < *n; i++)
+        assert_true(events[i].begin >= events[i - 1].begin);
     return root;
 }
 
@@ -89,8 +101,8 @@ static void test_stages(void **state)
     static event events[4096];
     int n;
     char *path = path_in(place.folder, "t.json");
-    tool_result r =
-        BATCH(&place, "out", 0, "--quiet", "--trace", path, "--set", "outputs.beauty.colorspace=ACEScg");
+    tool_result r = BATCH(&place, "out", 0, "--quiet", "--trace", path, "--set",
+                          "outputs.beauty.colorspace=ACEScg", "--checkpoint-frames", "2");
     tool_result_free(&r);
     json_t *root = load(path, events, 4096, &n);
     for (int frame = 1; frame <= FRAMES; frame++) {
@@ -112,6 +124,8 @@ static void test_stages(void **state)
         }
         assert_int_equal(kernels, 3); /* lighting, combine, taa */
     }
+    const event *saved = find(events, n, "checkpoint", 2);
+    assert_true(saved && saved->lane == 4 && inside(saved, find(events, n, "write", 2)));
     for (int a = 0; a < n; a++) /* what one thread does nests or follows, or viewers draw nonsense */
         for (int b = 0; b < a; b++)
             if (events[a].lane == events[b].lane)
@@ -131,6 +145,11 @@ static void test_failures(void **state)
     int n;
     char *path = path_in(place.folder, "f.json"), *frame = path_in(place.capture, "loop.0003.exr");
     assert_int_equal(unlink(frame), 0);
+    size_t size;
+    char *manifest = path_in(place.capture, "capture.yaml"), *text = file_read(manifest, &size),
+         *named = text_replace(text, "name: loop", "name: köln");
+    file_write(place.capture, "capture.yaml", named, strlen(named));
+    capture = "köln";
     tool_result r = BATCH(&place, "failed", 1, "--quiet", "--trace", path);
     tool_result_free(&r);
     json_t *root = load(path, events, 4096, &n);
@@ -143,6 +162,9 @@ static void test_failures(void **state)
     tool_result_free(&r);
     char *out = path_in(place.folder, "unwritten");
     assert_int_equal(folder_files(out), 2);
+    free(manifest);
+    free(named);
+    free(text);
     free(out);
     free(frame);
     free(path);

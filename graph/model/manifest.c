@@ -207,16 +207,14 @@ rl_code rl_manifest_load(rl_arena *arena, const char *path, const char *presets,
                          rl_manifest **out, rl_error *err)
 {
     rl_value *v;
-    const char *given = path;
     *out = NULL;
-    if (rl_path_is_folder(path) && !(path = rl_path_join(arena, path, "capture.yaml")))
+    const char *folder = rl_path_is_folder(path) ? path : NULL;
+    if (folder && !(path = rl_path_join(arena, folder, "capture.yaml")))
         return rl_fail_memory(err, 64);
-    if (path != given && !rl_path_exists(path))
-        return rl_fail_file(
-            err, RL_E_IO, given,
-            "the folder holds no capture.yaml (`relit inspect %s` prints one for the EXR files "
-            "in it)",
-            given);
+    if (folder && !rl_path_exists(path))
+        return rl_fail_file(err, RL_E_IO, folder,
+                            "the folder holds no capture.yaml; `relit inspect %s` prints one to begin with",
+                            folder);
     rl_code code = rl_config_load(arena, path, &v, err);
     if (!code && rl_value_get(v, "relit") && !rl_value_get(v, "relit_capture"))
         return rl_fail_file(err, RL_E_CONFIG, path,

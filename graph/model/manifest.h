@@ -70,17 +70,21 @@ typedef struct rl_layer {
     /* Alternatives of n_channels names each, one after the other; after rl_manifest_bind one is left. A name
      * may hold one '*' (presets: the view layer's name). */
     const char **channels;
-    int n_channels, n_alternatives;
-    const char *part; /* of a multi-part file; NULL: whichever has the channels */
-    int pattern;      /* index into rl_manifest.patterns */
+    int n_channels, n_alternatives; /* 0, 0: a stencil that is constant */
+    const char *part;               /* of a multi-part file; NULL: whichever has the channels */
+    int pattern;                    /* index into rl_manifest.patterns */
     bool from_preset; /* not the user's own: dropped by rl_manifest_bind when the file lacks it */
 
     const char *colorspace; /* albedo, emission, back_albedo */
     rl_where colorspace_where;
     rl_space space; /* normals */
     rl_encoding encoding;
+    int axes[3]; /* normals: which of the file's axes are x, y, z: 1, 2, 3, or negative; 1, 2, 3 as a rule */
     rl_depth_kind kind;   /* depths */
+    bool hashed;          /* stencil: Cryptomatte, the bits of a float are the id */
+    uint32_t constant;    /* stencil: the id of all pixels, when n_channels is 0 */
     double near_m, far_m; /* RL_DEPTH_DEVICE; metres, 0 < near < far, far may be infinite */
+    bool negated;         /* depths: the file has -z, as view space looks down -z; all below is of +z */
     bool reversed;        /* RL_DEPTH_DEVICE: 1 at the near plane */
     double empty;         /* the file's value from which on (reversed: down to which) a pixel is empty */
     double scale;         /* lengths: metres a unit of the file; curvature: 1/m a unit */
@@ -110,6 +114,8 @@ typedef struct rl_camera_spec {
     double (*jitter)[2];  /* pixels, x right, y down */
     size_t n_matrix, n_fov, n_jitter; /* 1, or one a frame of rl_manifest.frames */
     bool forward_z;                   /* forward: +z, left-handed */
+    bool has_shift;                   /* else the header's screen window says it */
+    double shift[2]; /* of the lens: the image is moved right and up, in widths of the display window */
 } rl_camera_spec;
 
 /* ---- the manifest ---- */
@@ -193,6 +199,11 @@ typedef struct rl_channel {
 rl_code rl_manifest_bind(rl_arena *arena, rl_manifest *m, int pattern, const char *file,
                          const rl_channel *channels, size_t n, rl_error *err);
 
+/* The same for a manifest of one pattern, without an error for required layers that are not there: they go.
+ */
+rl_code rl_manifest_bind_found(rl_arena *arena, rl_manifest *m, const rl_channel *channels, size_t n,
+                               rl_error *err);
+
 /* The error of a file that lacks a channel of a layer: says what is needed, what is there, and where to set
  * it. */
 rl_code rl_layer_missing(const rl_layer *layer, const char *file, const rl_channel *channels, size_t n,
@@ -209,6 +220,15 @@ typedef struct rl_preset_match {
  * layers found, then by name. */
 rl_code rl_preset_find(rl_arena *arena, const char *presets, const rl_channel *channels, size_t n,
                        rl_preset_match *out, rl_error *err);
+
+/* What a preset says to its users. */
+typedef struct rl_preset_words {
+    const char *help;   /* one line */
+    const char **check; /* what to look after, a line each */
+    size_t n_check;
+} rl_preset_words;
+rl_code rl_preset_about(rl_arena *arena, const char *presets, const char *name, rl_preset_words *out,
+                        rl_error *err);
 
 /* A preset's value tree, without its own keys; an unknown name suggests the nearest. */
 rl_code rl_preset_load(rl_arena *arena, const char *presets, const char *name, rl_where where, rl_value **out,

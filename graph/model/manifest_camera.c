@@ -15,7 +15,8 @@ static bool is_header(const rl_value *v)
  * matrix would scale them. `what` names the matrix. */
 static rl_code check_matrix(const double *m, rl_where where, const char *what, rl_code code, rl_error *err)
 {
-    if (m[12] != 0 || m[13] != 0 || m[14] != 0 || m[15] != 1)
+    /* Arnold writes 1.0000001 there */
+    if (!(fabs(m[12]) <= 1e-5 && fabs(m[13]) <= 1e-5 && fabs(m[14]) <= 1e-5 && fabs(m[15] - 1) <= 1e-5))
         return rl_fail(
             err, code, where,
             "%s: the last row must be 0, 0, 0, 1 (rows listed, for column vectors; a matrix for row "
@@ -102,10 +103,11 @@ static rl_code read_jitter(rl_manifest_reader *r, const rl_value *v)
 
 rl_code rl_manifest_read_camera(rl_manifest_reader *r, const rl_value *v)
 {
-    static const char *const known[] = {"matrix", "forward", "fov_x", "jitter"};
+    static const char *const known[] = {"matrix", "forward", "fov_x", "jitter", "shift"};
     rl_camera_spec *c = &r->m->camera;
-    c->where = v ? v->where : r->m->where;
-    rl_code code = v ? rl_value_keys(v, "camera", known, 4, r->err) : RL_OK;
+    bool own = v && !(r->preset_file && v->where.file && !strcmp(v->where.file, r->preset_file));
+    c->where = own ? v->where : r->m->where; /* a preset is no place to correct what a capture lacks */
+    rl_code code = v ? rl_value_keys(v, "camera", known, 5, r->err) : RL_OK;
     const rl_value *forward = rl_value_get(v, "forward");
     int word = 0;
     if (!forward)
@@ -113,6 +115,10 @@ rl_code rl_manifest_read_camera(rl_manifest_reader *r, const rl_value *v)
     if (!code && forward)
         code = rl_value_word(forward, "forward", "-z|+z", &word, r->err);
     c->forward_z = word == 1;
+    const rl_value *shift = rl_value_get(v, "shift");
+    c->has_shift = !is_header(shift);
+    if (!code && c->has_shift)
+        code = rl_value_numbers(shift, "shift", 2, c->shift, r->err);
     if (!code)
         code = read_matrix(r, rl_value_get(v, "matrix"));
     if (!code)
@@ -132,8 +138,11 @@ rl_code rl_manifest_view(const rl_manifest *m, int frame, const float *header, d
     const rl_camera_spec *c = &m->camera;
     double w[16];
     if (c->matrix_source == RL_SOURCE_HEADER && !header)
-        return rl_fail(err, RL_E_FORMAT, c->where,
-                       "frame %d: the file has no attribute worldToCamera; give camera.matrix", frame);
+        return rl_fail(
+            err, RL_E_FORMAT, c->where,
+            "frame %d: the file has no attribute worldToCamera; give camera.matrix: 16 numbers, world to "
+            "camera, rows listed, for column vectors (how to get them: configs/captures.md)",
+            frame);
     for (int i = 0; i < 16; i++) /* the header's is for row vectors: its transpose */
         w[i] = c->matrix_source == RL_SOURCE_HEADER ? (double)header[4 * (i % 4) + i / 4]
                                                     : c->matrix[element(m, c->matrix_source, frame)][i];

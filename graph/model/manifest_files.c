@@ -137,6 +137,8 @@ static rl_code read_file_map(rl_manifest_reader *r, const rl_value *v)
     }
     for (int k = 0; k < m->n_layers; k++) {
         const rl_entry *e = entry_for(v, &m->layers[k]);
+        if (!e && !m->layers[k].n_channels) /* a constant is in no file */
+            continue;
         if (!e)
             return rl_fail(r->err, RL_E_CONFIG, v->where,
                            "files: no file is given for layer '%s' (nor a default)", m->layers[k].name);

@@ -9,12 +9,13 @@
 const rl_layer_type rl_layer_types[RL_LAYER_COUNT] = {
     [RL_LAYER_ALBEDO] = {"albedo", RL_RGB, 3, .required = true, .keys = {"colorspace"},
                          .help = "scene-linear diffuse colour, 0..1"},
-    [RL_LAYER_NORMAL] = {"normal", RL_NORMAL, 3, .required = true, .keys = {"space", "encoding"},
+    [RL_LAYER_NORMAL] = {"normal", RL_NORMAL, 3, .required = true, .keys = {"space", "encoding", "axes"},
                          .help = "unit shading normal"},
     [RL_LAYER_DEPTH] = {"depth", RL_SCALAR, 1, .required = true,
-                        .keys = {"kind", "near", "far", "reversed", "empty", "unit"},
+                        .keys = {"kind", "near", "far", "reversed", "empty", "unit", "negated"},
                         .help = "distance along the view axis"},
-    [RL_LAYER_STENCIL] = {"stencil", RL_ID, 1, .required = true, .help = "material id, any 32-bit integer"},
+    [RL_LAYER_STENCIL] = {"stencil", RL_ID, 1, .required = true, .keys = {"encoding", "constant"},
+                          .help = "material id, any 32-bit integer"},
     [RL_LAYER_THICKNESS] = {"thickness", RL_SCALAR, 1, .keys = {"unit", "remap"},
                             .help = "length along the inward normal to the back face, 0 = unknown"},
     [RL_LAYER_SHADOW] = {"shadow", RL_LIGHTS, 1, .per_light = true, .help = "visibility of a light, 0..1"},
@@ -31,9 +32,9 @@ const rl_layer_type rl_layer_types[RL_LAYER_COUNT] = {
     [RL_LAYER_CURVATURE] = {"curvature", RL_SCALAR, 1, .keys = {"unit"},
                             .help = "mean curvature, 1 / length, convex positive"},
     [RL_LAYER_BACK_DEPTH] = {"back_depth", RL_SCALAR, 1,
-                             .keys = {"kind", "near", "far", "reversed", "empty", "unit"},
+                             .keys = {"kind", "near", "far", "reversed", "empty", "unit", "negated"},
                              .help = "depth of the closest back face, empty where there is none"},
-    [RL_LAYER_BACK_NORMAL] = {"back_normal", RL_NORMAL, 3, .keys = {"space", "encoding"},
+    [RL_LAYER_BACK_NORMAL] = {"back_normal", RL_NORMAL, 3, .keys = {"space", "encoding", "axes"},
                               .help = "normal of the closest back face, out of the object"},
     [RL_LAYER_BACK_ALBEDO] = {"back_albedo", RL_RGB, 3, .keys = {"colorspace"},
                               .help = "albedo of the closest back face"},
@@ -103,6 +104,26 @@ static rl_code read_alternatives(const layer_reader *l, const rl_value *v)
     return code;
 }
 
+/* axes: [-x, z, y]: what the file calls x, turned around, is our x, what it calls z our y, … */
+static rl_code read_axes(const layer_reader *l, const rl_value *v)
+{
+    static const char expected[] = "three of x, y, z, -x, -y, -z, each axis once, such as [x, -z, y]";
+    unsigned seen = 0;
+    if (v->kind != RL_LIST || v->n != 3)
+        return rl_value_wrong(v, "axes", expected, l->r->err);
+    for (int i = 0; i < 3; i++) {
+        const char *text = v->items[i]->text ? v->items[i]->text : "";
+        int sign = text[0] == '-' ? -1 : 1;
+        const char *name = text + (sign < 0 || text[0] == '+');
+        bool one = name[0] >= 'x' && name[0] <= 'z' && !name[1];
+        if (!one || seen & 1u << (name[0] - 'x'))
+            return rl_value_wrong(v->items[i], "axes", expected, l->r->err);
+        seen |= 1u << (name[0] - 'x');
+        l->layer->axes[i] = sign * (name[0] - 'x' + 1);
+    }
+    return RL_OK;
+}
+
 static rl_code read_normal(const layer_reader *l)
 {
     const rl_value *space = stated(l, "space", "world"), *encoding = stated(l, "encoding", "signed");
@@ -113,6 +134,26 @@ static rl_code read_normal(const layer_reader *l)
     if (!code && encoding)
         code = rl_value_word(encoding, "encoding", "signed|unsigned|octahedral", &word, l->r->err);
     l->layer->encoding = (rl_encoding)word;
+    const rl_value *axes = rl_value_get(l->map, "axes");
+    for (int i = 0; i < 3; i++)
+        l->layer->axes[i] = i + 1;
+    return code || !axes ? code : read_axes(l, axes);
+}
+
+static rl_code read_stencil(const layer_reader *l)
+{
+    const rl_value *encoding = rl_value_get(l->map, "encoding"), *constant = rl_value_get(l->map, "constant");
+    int word = 0;
+    long long id = 0;
+    rl_code code =
+        encoding ? rl_value_word(encoding, "encoding", "integer|cryptomatte", &word, l->r->err) : RL_OK;
+    if (!code && constant)
+        code = rl_value_integer(constant, "constant", INT32_MIN, UINT32_MAX, &id, l->r->err);
+    if (!code && constant && (encoding || rl_value_get(l->map, "channels") || rl_value_get(l->map, "part")))
+        code = rl_fail(l->r->err, RL_E_CONFIG, constant->where,
+                       "layer 'stencil': 'constant' is the id of every pixel, instead of channels");
+    l->layer->hashed = word == 1;
+    l->layer->constant = (uint32_t)id;
     return code;
 }
 
@@ -144,6 +185,7 @@ static rl_code read_depth(const layer_reader *l)
     static const char *const device_keys[] = {"near", "far", "reversed"};
     rl_error *err = l->r->err;
     const rl_value *kind = stated(l, "kind", "planar"), *empty = rl_value_get(l->map, "empty");
+    const rl_value *negated = rl_value_get(l->map, "negated");
     int word = 0;
     rl_code code = kind ? rl_value_word(kind, "kind", "planar|radial|device", &word, err) : RL_OK;
     l->layer->kind = (rl_depth_kind)word;
@@ -156,6 +198,8 @@ static rl_code read_depth(const layer_reader *l)
     }
     if (!code && word == RL_DEPTH_DEVICE)
         code = read_device(l);
+    if (!code && negated)
+        code = rl_value_truth(negated, "negated", &l->layer->negated, err);
     if (!code && empty)
         code = rl_value_number(empty, "empty", word == RL_DEPTH_DEVICE ? -INFINITY : DBL_MIN, INFINITY,
                                &l->layer->empty, err);
@@ -228,6 +272,10 @@ static rl_code read_layer(rl_manifest_reader *r, rl_layer_id id, const rl_entry 
         code = read_scale(&l);
     if (!code && has_key(type, "space"))
         code = read_normal(&l);
+    if (!code && id == RL_LAYER_STENCIL)
+        code = read_stencil(&l);
+    if (!code && id == RL_LAYER_STENCIL && rl_value_get(l.map, "constant"))
+        return RL_OK;
     if (!code && has_key(type, "kind"))
         code = read_depth(&l);
     if (!code && has_key(type, "points"))
@@ -292,6 +340,7 @@ rl_code rl_manifest_read_layers(rl_manifest_reader *r, const rl_value *v)
 
 double rl_layer_depth(const rl_layer *layer, double raw, double slope)
 {
+    raw = layer->negated ? -raw : raw;
     switch (layer->kind) {
     case RL_DEPTH_PLANAR:
         return raw * layer->scale;
@@ -311,6 +360,7 @@ bool rl_layer_is_empty(const rl_layer *layer, double raw)
 {
     if (!isfinite(raw))
         return true;
+    raw = layer->negated ? -raw : raw;
     if (layer->kind == RL_DEPTH_DEVICE)
         return layer->reversed ? raw <= layer->empty : raw >= layer->empty;
     return raw >= layer->empty || raw <= 0;

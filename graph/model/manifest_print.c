@@ -35,9 +35,9 @@ static void print_numbers(rl_str *s, const double *x, size_t n)
     rl_str_add(s, "]");
 }
 
-/* header, one value, or one a frame */
+/* header, one value, or one a frame; each number divided by `unit` */
 static void print_source(rl_str *s, const char *key, rl_source source, const double *x, size_t width,
-                         size_t n)
+                         size_t n, double unit)
 {
     rl_str_printf(s, "  %s: ", key);
     if (source == RL_SOURCE_HEADER)
@@ -46,12 +46,12 @@ static void print_source(rl_str *s, const char *key, rl_source source, const dou
         for (size_t i = 0; i < n; i++) {
             rl_str_add(s, i ? ", " : "[");
             if (width == 1)
-                print_number(s, x[i]);
+                print_number(s, x[i] / unit);
             else
                 print_numbers(s, x + i * width, width);
         }
     else if (width == 1)
-        print_number(s, x[0]);
+        print_number(s, x[0] / unit);
     else
         print_numbers(s, x, width);
     rl_str_add(s, source == RL_SOURCE_LIST ? "]\n" : "\n");
@@ -60,10 +60,15 @@ static void print_source(rl_str *s, const char *key, rl_source source, const dou
 static void print_camera(const rl_camera_spec *c, rl_str *s)
 {
     rl_str_add(s, "camera:\n");
-    print_source(s, "matrix", c->matrix_source, c->matrix ? c->matrix[0] : NULL, 16, c->n_matrix);
+    print_source(s, "matrix", c->matrix_source, c->matrix ? c->matrix[0] : NULL, 16, c->n_matrix, 1);
     rl_str_printf(s, "  forward: %s\n", c->forward_z ? "+z" : "-z");
-    print_source(s, "fov_x", c->fov_source, c->fov_x, 1, c->n_fov);
-    print_source(s, "jitter", c->jitter_source, c->jitter ? c->jitter[0] : NULL, 2, c->n_jitter);
+    print_source(s, "fov_x", c->fov_source, c->fov_x, 1, c->n_fov, pi / 180); /* degrees */
+    if (c->has_shift) {
+        rl_str_add(s, "  shift: ");
+        print_numbers(s, c->shift, 2);
+        rl_str_add(s, "\n");
+    }
+    print_source(s, "jitter", c->jitter_source, c->jitter ? c->jitter[0] : NULL, 2, c->n_jitter, 1);
 }
 
 static void print_depth(const rl_layer *l, rl_str *s)
@@ -77,6 +82,8 @@ static void print_depth(const rl_layer *l, rl_str *s)
         print_number(s, l->far_m / l->scale);
         rl_str_printf(s, ", reversed: %s", l->reversed ? "true" : "false");
     }
+    if (l->negated)
+        rl_str_add(s, ", negated: true");
     if (isfinite(l->empty)) {
         rl_str_add(s, ", empty: ");
         print_number(s, l->empty);
@@ -114,6 +121,10 @@ static void print_layer(const rl_manifest *m, const rl_layer *l, rl_str *s)
         print_text(s, l->channels[0]);
         return;
     }
+    if (!l->n_channels) {
+        rl_str_printf(s, "{constant: %u}", (unsigned)l->constant);
+        return;
+    }
     rl_str_add(s, "{channels: ");
     print_channels(l, s);
     if (l->part) {
@@ -124,9 +135,15 @@ static void print_layer(const rl_manifest *m, const rl_layer *l, rl_str *s)
         rl_str_add(s, ", colorspace: ");
         print_text(s, l->colorspace);
     }
+    if (l->hashed)
+        rl_str_add(s, ", encoding: cryptomatte");
     if (format == RL_NORMAL)
         rl_str_printf(s, ", space: %s, encoding: %s", l->space == RL_SPACE_CAMERA ? "camera" : "world",
                       encodings[l->encoding]);
+    if (format == RL_NORMAL && (l->axes[0] != 1 || l->axes[1] != 2 || l->axes[2] != 3))
+        for (int i = 0; i < 3; i++)
+            rl_str_printf(s, "%s%s%c%s", i ? ", " : ", axes: [", l->axes[i] < 0 ? "-" : "",
+                          "xyz"[abs(l->axes[i]) - 1], i == 2 ? "]" : "");
     if (l->id == RL_LAYER_DEPTH || l->id == RL_LAYER_BACK_DEPTH)
         print_depth(l, s);
     if (l->id == RL_LAYER_MOTION)
@@ -259,6 +276,8 @@ static void print_files(const rl_manifest *m, rl_str *s)
     }
     rl_str_add(s, "files:\n");
     for (int i = 0; i < m->n_layers; i++) {
+        if (!m->layers[i].n_channels) /* a constant is in no file */
+            continue;
         rl_str_add(s, "  ");
         print_text(s, m->layers[i].name);
         rl_str_add(s, ": ");

@@ -1,7 +1,8 @@
 /* Presets: what renderers call their channels, as YAML files of a folder (configs/presets), so that users add
  * their own. A preset is a piece of manifest with `relit_preset: 1`, `help` and `source` on top; in it, the
  * names of a layer's channels may hold a '*' (the view layer's name, the same for all layers), and `channels`
- * may list alternatives, the first of which that a file has is taken. */
+ * may list alternatives, the first of which that a file has is taken. `check` lists what `relit inspect`
+ * tells those who use it to look after. */
 #include "graph/model/manifest_parts.h"
 
 #include <dirent.h>
@@ -183,7 +184,7 @@ static rl_code bind_all(binder *b, int pattern, const char *file, bool strict, r
         rl_layer layer = m->layers[i];
         bool found = true;
         rl_code code = RL_OK;
-        if (layer.pattern != pattern || !is_open(&layer)) {
+        if (layer.pattern != pattern || !is_open(&layer) || !layer.n_channels) {
             bound[n++] = layer;
             continue;
         }
@@ -211,6 +212,13 @@ rl_code rl_manifest_bind(rl_arena *arena, rl_manifest *m, int pattern, const cha
 {
     binder b = {.arena = arena, .m = m, .channels = channels, .n = n};
     return bind_all(&b, pattern, file ? file : "", file != NULL, err);
+}
+
+rl_code rl_manifest_bind_found(rl_arena *arena, rl_manifest *m, const rl_channel *channels, size_t n,
+                               rl_error *err)
+{
+    binder b = {.arena = arena, .m = m, .channels = channels, .n = n};
+    return bind_all(&b, 0, "", false, err);
 }
 
 /* ---- the folder of presets ---- */
@@ -256,7 +264,7 @@ static rl_code unknown_preset(rl_arena *arena, const char *presets, const char *
 rl_code rl_preset_load(rl_arena *arena, const char *presets, const char *name, rl_where where, rl_value **out,
                        rl_error *err)
 {
-    static const char *const known[] = {"relit_preset", "help",   "source", "unit",
+    static const char *const known[] = {"relit_preset", "help",   "source", "check",        "unit",
                                         "camera",       "layers", "fps",    "stencil_names"};
     rl_value gone = {.kind = RL_NULL};
     *out = NULL;
@@ -272,11 +280,32 @@ rl_code rl_preset_load(rl_arena *arena, const char *presets, const char *name, r
         code = rl_value_keys(v, "a preset", known, sizeof known / sizeof *known, err);
     if (!code)
         code = rl_value_integer(rl_value_get(v, "relit_preset"), "relit_preset", 1, 1, &version, err);
-    for (int i = 0; i < 3 && !code; i++)
+    for (int i = 0; i < 4 && !code; i++)
         code = rl_value_set(arena, &v, known[i], &gone, err);
     if (!code)
         *out = v;
     return code;
+}
+
+rl_code rl_preset_about(rl_arena *arena, const char *presets, const char *name, rl_preset_words *out,
+                        rl_error *err)
+{
+    rl_value *v;
+    *out = (rl_preset_words){0};
+    char *path = rl_arena_printf(arena, "%s/%s.yaml", presets, name);
+    rl_code code = path ? rl_yaml_load(arena, path, &v, err) : rl_fail_memory(err, strlen(name));
+    if (code)
+        return code;
+    const rl_value *help = rl_value_get(v, "help"), *check = rl_value_get(v, "check");
+    size_t n = check && check->kind == RL_LIST ? check->n : 0;
+    out->help = help && help->text ? help->text : "";
+    out->check = rl_arena_array(arena, n + 1, sizeof *out->check);
+    if (!out->check)
+        return rl_fail_memory(err, n * sizeof *out->check);
+    for (size_t i = 0; i < n; i++)
+        if (check->items[i]->text)
+            out->check[out->n_check++] = check->items[i]->text;
+    return RL_OK;
 }
 
 /* How well one preset fits; *out is overwritten. */
@@ -294,7 +323,9 @@ static rl_code judge(rl_arena *scratch, const char *presets, const char *name, c
     code = rl_manifest_read_layers(&r, rl_value_get(v, "layers"));
     if (!code)
         code = bind_all(&b, 0, "", false, err);
-    *out = (rl_preset_match){.layers = m.n_layers};
+    *out = (rl_preset_match){0};
+    for (int i = 0; i < m.n_layers && !code; i++)
+        out->layers += m.layers[i].n_channels > 0; /* a constant is no sign of a renderer */
     for (int i = 0; i < RL_LAYER_COUNT && !code; i++) {
         if (!rl_layer_types[i].required || rl_manifest_layer(&m, rl_layer_types[i].name))
             continue;

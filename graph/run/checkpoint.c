@@ -141,6 +141,7 @@ rl_code rl_checkpoint_read(const char *path, bool whole, rl_checkpoint *out, rl_
         out->frame = (int)h.frame;
         out->geometry = h.geometry;
         out->previous = h.previous;
+        out->bytes = h.bytes;
     }
     if (!code && whole)
         code = read_history(f, path, &h, out, err);

@@ -15,8 +15,8 @@ extern "C" {
 /* What decides the bits of a picture besides its inputs: hashes, so that a complaint can say what differs. */
 typedef enum rl_identity_part {
     RL_ID_VERSION,
-    RL_ID_PIPELINE, /* merged content, user kernels' files, --only, --dump, --crop */
-    RL_ID_CAPTURE,  /* the manifest without its paths and its list of frames */
+    RL_ID_PIPELINE, /* its content and that of the files that it names; --only, --dump, --crop */
+    RL_ID_CAPTURE,  /* the manifest without its paths and its list of frames; the colour configuration */
     RL_ID_PLAN,
     RL_ID_KERNELS, /* their texts and tables: colour transforms are in there */
     RL_ID_DEVICE,  /* its name, version and driver */
@@ -37,7 +37,7 @@ typedef struct rl_checkpoint {
     rl_geometry geometry;
     camera_t previous;
     void *history; /* owned; freed by rl_checkpoint_free */
-    size_t bytes;
+    size_t bytes;  /* 0: none; it ended with that frame, which failed or was held */
 } rl_checkpoint;
 
 void rl_checkpoint_free(rl_checkpoint *checkpoint);
@@ -45,8 +45,8 @@ void rl_checkpoint_free(rl_checkpoint *checkpoint);
 /* Whole or not there, on the disk when it returns. */
 rl_code rl_checkpoint_write(const char *path, const rl_checkpoint *checkpoint, rl_error *err);
 
-/* The header alone (history NULL), or all of it, its hash checked. RL_E_FORMAT when it is no checkpoint of
- * this layout or is damaged. */
+/* The header alone (history NULL, but its bytes), or all of it, its hash checked. RL_E_FORMAT when it is no
+ * checkpoint of this layout or is damaged. */
 rl_code rl_checkpoint_read(const char *path, bool whole, rl_checkpoint *out, rl_error *err);
 
 /* "FOLDER/NAME.0012.checkpoint". */

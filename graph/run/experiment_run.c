@@ -222,6 +222,9 @@ rl_code rl_experiment_run(rl_experiment *x, const rl_experiment_hooks *hooks, rl
     rl_code code = rl_folder_make(x->options.out ? x->options.out : "out", err);
     if (!code && !x->device)
         code = rl_device_open(x->options.device, x->options.threads, x->log, &x->device, err);
+    for (size_t i = 0; i < x->n && !code; i++)
+        if (x->variants[i].files)
+            rl_session_clean(x->sessions[i]);
     for (size_t k = 0; k < x->n_captures && !code && !stopped; k++)
         code = run_capture(x, k, hooks, summary, &done, total, &stopped, err);
     summary->peak_bytes = rl_alloc_peak();

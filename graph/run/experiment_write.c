@@ -144,8 +144,11 @@ void rl_experiment_write(rl_capture_run *r, size_t item, rl_run_slot *s)
         s->error = (rl_error){0};
     else if (r->hooks && r->hooks->frame) {
         rl_error own = {0};
+        double begin = rl_state_now();
         if (r->hooks->frame(r->hooks->ctx, &d.frame, &own) && !s->error.code)
             s->error = own;
+        rl_session_span(&r->notes, rl_experiment_sequence(r->x, 0, r->capture), first, RL_LANE_WRITE,
+                        "compare", "compare", begin);
     }
     for (size_t i = 0; i < d.n_mapped; i++)
         rl_memory_unmap(d.mapped[i], NULL); /* what was read has been read */

@@ -91,11 +91,13 @@ const rl_exr_channel *rl_exr_channel_named(const rl_exr_part *part, const char *
  * of them stay and none is counted.
  *
  * As ids, uint comes as it is; half and float must be integral and within int32 or uint32, else RL_E_DATA
- * names the pixel and the value. A negative id keeps its 32 bits. */
+ * names the pixel and the value. A negative id keeps its 32 bits. With `bits`, a float channel's 32 bits are
+ * the id (Cryptomatte), and half is RL_E_DATA. */
 typedef struct rl_exr_plane {
     const char *channel;
     float *floats;
     uint32_t *ids;
+    bool bits;
     size_t stride; /* elements from a row to the next, >= width */
     bool replace_inf;
     float inf_value;

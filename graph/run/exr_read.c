@@ -53,10 +53,11 @@ static rl_code fail_value(const job *j, const rl_exr_plane *plane, rl_exr_pixel 
         snprintf(value, sizeof value, "%u", word);
     else
         rl_format_float(type == RL_EXR_HALF ? rl_exr_half_value((uint16_t)word) : f, value);
-    return rl_fail_file(err, RL_E_DATA, j->file->path,
-                        "channel '%s' holds %s at pixel (%d, %d), which is not %s", plane->channel, value,
-                        x + j->info->data_window.x0, y + j->info->data_window.y0,
-                        plane->ids ? "a 32-bit id" : "exact as a float");
+    return rl_fail_file(
+        err, RL_E_DATA, j->file->path, "channel '%s' holds %s at pixel (%d, %d), which is not %s",
+        plane->channel, value, x + j->info->data_window.x0, y + j->info->data_window.y0,
+        plane->ids ? "a 32-bit id (ids must not be filtered; Cryptomatte needs encoding: cryptomatte)"
+                   : "exact as a float");
 }
 
 /* Half and float without replacing anything. */
@@ -80,7 +81,7 @@ static rl_code store_row(worker *w, int p, rl_exr_pixel type, const uint8_t *raw
     size_t n = (size_t)at->width, good = n;
     size_t to = (size_t)y * plane->stride + (size_t)at->x;
     if (plane->ids) {
-        if (type == RL_EXR_UINT)
+        if (type == RL_EXR_UINT || (plane->bits && type == RL_EXR_FLOAT))
             memcpy(plane->ids + to, raw, 4 * n);
         else if (type == RL_EXR_HALF)
             good = rl_exr_half_to_id(raw, plane->ids + to, n);
@@ -270,6 +271,10 @@ static rl_code bind(job *j, rl_error *err)
             return rl_fail_file(err, RL_E_FORMAT, j->file->path,
                                 "channel '%s' is subsampled (%d x %d), which is not supported",
                                 plane->channel, channel->x_sampling, channel->y_sampling);
+        if (plane->ids && plane->bits && channel->type == RL_EXR_HALF)
+            return rl_fail_file(err, RL_E_DATA, j->file->path,
+                                "channel '%s' is half, but Cryptomatte's hashes need all 32 bits of a float",
+                                plane->channel);
         if (!plane->floats == !plane->ids || plane->stride < (size_t)info->width)
             return rl_fail_file(err, RL_E_USAGE, j->file->path, "channel '%s' has no proper destination",
                                 plane->channel);

@@ -1,6 +1,7 @@
 #include "graph/run/ingest.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 /* The loops are built twice, and the processor chooses at load time. AVX2 alone brings no fused multiply-add,
@@ -38,9 +39,9 @@ uint64_t rl_ingest_scalar(float *plane, rl_rows rows, float scale, float offset,
 WIDE static void planar_row(float *row, int width, const rl_layer *layer)
 {
     float scale = (float)layer->scale;
-    float empty = layer->empty < 3.4e38 ? (float)layer->empty : 3.4e38f;
+    float empty = layer->empty < 3.4e38 ? (float)layer->empty : 3.4e38f, sign = layer->negated ? -1.0f : 1.0f;
     for (int x = 0; x < width; x++) {
-        float v = row[x];
+        float v = row[x] * sign;
         row[x] = v > 0 && v < empty ? v * scale : 0.0f;
     }
 }
@@ -140,6 +141,21 @@ WIDE static void normalize_row(float *x, float *y, float *z, int width)
         y[i] *= s;
         z[i] *= s;
     }
+}
+
+const float *rl_ingest_normal_matrix(const rl_layer *layer, const camera_t *camera, bool forward_z,
+                                     float m[9])
+{
+    bool turned = layer->space == RL_SPACE_CAMERA, plain = true;
+    for (int i = 0; i < 9; i++) {
+        int row = i / 3, axis = i % 3, from = layer->axes[axis];
+        float v = turned ? camera->to_world[4 * row + axis] : row == axis ? 1.0f : 0.0f;
+        if (turned && axis == 2 && forward_z) /* a capture that looks down +z has its own z turned around */
+            v = -v;
+        m[3 * row + abs(from) - 1] = from < 0 ? -v : v;
+        plain = plain && from == axis + 1;
+    }
+    return turned || !plain ? m : NULL;
 }
 
 void rl_ingest_normal_rows(float *const planes[3], rl_rows rows, const rl_ingest_normal *how)

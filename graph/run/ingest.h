@@ -46,6 +46,11 @@ typedef struct rl_ingest_normal {
     const float *rotate;
 } rl_ingest_normal;
 
+/* The rotation of a layer's normals to world space: its axes and, in camera space, the camera's; `m` holds
+ * it. NULL when there is nothing to do. */
+const float *rl_ingest_normal_matrix(const rl_layer *layer, const camera_t *camera, bool forward_z,
+                                     float m[9]);
+
 void rl_ingest_normal_rows(float *const planes[3], rl_rows rows, const rl_ingest_normal *how);
 
 /* Vectors to the frame before, in pixels, x right, y down. `width` and `height`: of the display window. */

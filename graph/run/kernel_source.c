@@ -2,6 +2,7 @@
 
 #include <stdlib.h>
 #include <string.h>
+#include <xxhash.h>
 
 #include "graph/base/alloc.h"
 #include "graph/base/file.h"
@@ -31,6 +32,19 @@ const char *rl_kernel_file(rl_arena *arena, const char *name)
         if (!strcmp(e->name, name))
             return (const char *)e->text;
     return NULL;
+}
+
+uint64_t rl_kernel_files_hash(void)
+{
+    const char *folder = getenv("RELIT_KERNELS");
+    uint64_t hash = 0;
+    rl_arena arena = {0};
+    for (const embedded *e = rl_embedded_kernels; folder && *folder && e->name; e++) {
+        const char *text = rl_kernel_file(&arena, e->name);
+        hash = XXH3_64bits_withSeed(text ? text : "", text ? strlen(text) : 0, hash + 1);
+    }
+    rl_arena_free(&arena);
+    return hash;
 }
 
 /* A path is whatever the user's folders are called. */

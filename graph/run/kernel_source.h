@@ -13,6 +13,8 @@ extern "C" {
  * files are read from that folder instead (for those who work on kernels); the text then lives in the arena.
  */
 const char *rl_kernel_file(rl_arena *arena, const char *name);
+/* Of all files that $RELIT_KERNELS puts in the place of the built-in ones; 0 when it is not set. */
+uint64_t rl_kernel_files_hash(void);
 
 /* What some light asks for; the code for the rest is left out (LIGHTS_x in programs of passes with .lights or
  * .light_tables). */

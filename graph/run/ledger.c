@@ -15,6 +15,7 @@
 
 #include "graph/base/alloc.h"
 #include "graph/base/file.h"
+#include "graph/run/file_hash.h"
 
 struct rl_ledger {
     rl_arena arena;
@@ -31,11 +32,15 @@ static const char suffix[] = ".ledger";
 /* ---- lines -----------------------------------------------------------------------------------------------
  */
 
-/* "TIME KIND FRAME CHAIN STAT CONTENT CHECK": a line that was cut short does not check. */
+static const char kinds[] = "-bdf", broken_kinds[] = "-BDF";
+
+/* "TIME KIND FRAME CHAIN STAT CONTENT CHECK", KIND upper case for broken inputs: a line that was cut short
+ * does not check. */
 static int print_line(char *out, size_t size, int frame, const rl_ledger_line *e)
 {
     int n = snprintf(out, size, "%016" PRIx64 " %c %d %016" PRIx64 " %016" PRIx64 " %016" PRIx64, e->time,
-                     "-bdf"[e->kind], frame, e -> chain, e -> inputs.stat, e->inputs.content);
+                     (e->inputs.broken ? broken_kinds : kinds)[e->kind], frame, e->chain, e->inputs.stat,
+                     e->inputs.content);
     unsigned check = (unsigned)XXH3_64bits(out, (size_t)n);
     return n + snprintf(out + n, size - (size_t)n, " %08x\n", check);
 }
@@ -49,8 +54,9 @@ static bool parse_line(const char *line, size_t length, int *frame, rl_ledger_li
         sscanf(line, "%" SCNx64 " %c %d %" SCNx64 " %" SCNx64 " %" SCNx64 " %x", &e->time, &kind, frame,
                &e->chain, &e->inputs.stat, &e->inputs.content, &check) != 7)
         return false;
-    const char *at = strchr("-bdf", kind);
-    e->kind = at ? (rl_ledger_kind)(at - "-bdf") : RL_LEDGER_NONE;
+    e->inputs.broken = kind < 'a';
+    const char *all = e->inputs.broken ? broken_kinds : kinds, *at = strchr(all, kind);
+    e->kind = at ? (rl_ledger_kind)(at - all) : RL_LEDGER_NONE;
     return e->kind != RL_LEDGER_NONE && check == (unsigned)XXH3_64bits(line, length - 9);
 }
 
@@ -189,36 +195,6 @@ rl_code rl_ledger_write(rl_ledger *l, int frame, rl_ledger_kind kind, uint64_t c
 /* ---- inputs ----------------------------------------------------------------------------------------------
  */
 
-/* Bytes of one file into a running hash. */
-static bool hash_file(XXH3_state_t *hash, const char *path, void *buffer, size_t room)
-{
-    int fd = open(path, O_RDONLY | O_CLOEXEC);
-    ssize_t n = -1;
-    while (fd >= 0 && (n = read(fd, buffer, room)) > 0)
-        XXH3_64bits_update(hash, buffer, (size_t)n);
-    if (fd >= 0)
-        close(fd);
-    return n == 0;
-}
-
-static uint64_t hash_content(const char *const *paths, size_t n, bool *good)
-{
-    enum { ROOM = 1 << 18 }; /* stays in the second-level cache */
-    void *buffer = rl_malloc(ROOM);
-    XXH3_state_t *hash = XXH3_createState();
-    uint64_t content = 0;
-    *good = buffer && hash;
-    if (*good)
-        XXH3_64bits_reset(hash);
-    for (size_t i = 0; i < n && *good; i++)
-        *good = hash_file(hash, paths[i], buffer, ROOM);
-    if (*good)
-        content = XXH3_64bits_digest(hash);
-    XXH3_freeState(hash);
-    rl_free(buffer);
-    return content;
-}
-
 rl_inputs rl_ledger_inputs(rl_ledger *l, int frame, const char *const *paths, size_t n)
 {
     rl_inputs in = {.stat = n};
@@ -236,8 +212,6 @@ rl_inputs rl_ledger_inputs(rl_ledger *l, int frame, const char *const *paths, si
         in.content = known.content;
         return in;
     }
-    bool good;
-    in.content = hash_content(paths, n, &good);
-    in.missing = !good;
+    in.missing = !rl_files_hash(paths, n, &in.content);
     return in;
 }

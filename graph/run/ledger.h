@@ -21,6 +21,7 @@ extern "C" {
 typedef struct rl_inputs {
     uint64_t stat, content;
     bool missing; /* one of them cannot be read */
+    bool broken;  /* of a ledger's line: they were there, and no frame could be made of them */
 } rl_inputs;
 
 typedef enum rl_ledger_kind {

@@ -37,18 +37,19 @@ static void convert_normal(const rl_reader *r, const rl_frame *f, const rl_layer
                            rl_rows rows)
 {
     float m[9];
-    for (int i = 0; i < 9; i++) { /* a capture that looks down +z has its own z turned around */
-        float v = f->camera.to_world[4 * (i / 3) + i % 3];
-        m[i] = i % 3 == 2 && r->setup.manifest->camera.forward_z ? -v : v;
-    }
+    bool forward_z = r->setup.manifest->camera.forward_z;
     rl_ingest_normal how = {.encoding = layer->encoding,
-                            .rotate = layer->space == RL_SPACE_CAMERA ? m : NULL};
+                            .rotate = rl_ingest_normal_matrix(layer, &f->camera, forward_z, m)};
     rl_ingest_normal_rows(p, rows, &how);
 }
 
 static void convert_stencil(const rl_reader *r, rl_frame *f, rl_frame_maps *maps, uint32_t *p, rl_rows rows)
 {
     rl_unknown_ids unknown = {0};
+    const rl_layer *layer = r->bindings[r->stencil].layer;
+    for (int y = rows.y0; y < rows.y1 && !layer->n_channels; y++)
+        for (int x = 0; x < rows.width; x++)
+            p[(size_t)y * rows.stride + (size_t)x] = layer->constant;
     for (int y = rows.y0; y < rows.y1 && f->ids; y++)
         memcpy(f->ids + (size_t)y * (size_t)rows.width, p + (size_t)y * rows.stride,
                (size_t)rows.width * sizeof *p);

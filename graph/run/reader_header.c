@@ -2,6 +2,7 @@
 #include <string.h>
 
 #include "graph/run/camera.h"
+#include "graph/run/camera_header.h"
 #include "graph/run/reader_parts.h"
 
 static rl_code missing_channel(const rl_layer *layer, const rl_exr *file, const char *channel, rl_error *err)
@@ -97,78 +98,74 @@ static rl_code check_readable(const rl_layer *layer, const rl_exr *file, int ind
 /* ---- headers ---------------------------------------------------------------------------------------------
  */
 
-static bool number_attr(const rl_exr *file, int part, const char *name, int n, double *out)
+/* Says once what the file leaves open. */
+static void report_camera(rl_reader *r, const rl_frame *f, int file_number, const rl_camera_lens *lens,
+                          bool has_jitter)
 {
-    rl_exr_value v;
-    if (!rl_exr_attr(file, part, name, &v) || rl_exr_type_numbers(v.type) != n)
-        return false;
-    memcpy(out, v.v, (size_t)n * sizeof *out);
-    return true;
-}
-
-/* Of the part that holds the depth, else of any part of the frame's files: some writers put what is common to
- * all parts into the first alone. */
-static bool camera_attr(const rl_frame *f, const char *name, int n, double *out)
-{
-    if (number_attr(f->files[f->main_file], f->main_part, name, n, out))
-        return true;
-    for (int i = 0; i < RL_MOST_FILES; i++)
-        for (int p = 0; f->files[i] && p < rl_exr_parts(f->files[i]); p++)
-            if (number_attr(f->files[i], p, name, n, out))
-                return true;
-    return false;
-}
-
-static void read_lens(rl_reader *r, const rl_frame *f, int file_number, rl_camera_info *c)
-{
-    const rl_exr *file = f->files[f->main_file];
-    const rl_exr_part *part = rl_exr_part_at(file, f->main_part);
-    const double *fov = rl_manifest_fov_x(r->setup.manifest, file_number);
-    const double *jitter = rl_manifest_jitter(r->setup.manifest, file_number);
-    c->screen_width = (double)part->screen_width;
-    c->screen_center[0] = (double)part->screen_center[0];
-    c->screen_center[1] = (double)part->screen_center[1];
-    c->pixel_aspect = (double)part->pixel_aspect;
-    if (fov) {
-        c->fov_x = *fov;
-    } else if (!camera_attr(f, "camera:fovx", 1, &c->fov_x) && !r->said_window) {
+    const rl_where where = {.file = rl_exr_path(f->files[f->main_file])};
+    bool window = !strcmp(lens->source, "screenWindowWidth"), unknown = window && lens->width == 1;
+    if (!rl_manifest_fov_x(r->setup.manifest, file_number) && !r->said_window) {
         r->said_window = true;
-        rl_report(
-            r->setup.log, c->screen_width == 1 ? RL_WARNING : RL_VERBOSE,
-            (rl_where){.file = rl_exr_path(file)},
-            "no attribute camera:fovx: the field of view is taken from screenWindowWidth %g%s",
-            c->screen_width,
-            c->screen_width == 1
-                ? ", which writers leave at 1 when they do not know it (set camera.fov_x in the manifest)"
-                : "");
+        if (window)
+            rl_report(r->setup.log, unknown ? RL_WARNING : RL_VERBOSE, where,
+                      "no attribute camera:fovx: the field of view is taken from screenWindowWidth %g%s",
+                      lens->width,
+                      unknown
+                          ? ", which writers leave at 1 when they do not know it (set camera.fov_x in the "
+                            "manifest)"
+                          : "");
+        else
+            rl_report(r->setup.log, RL_VERBOSE, where, "the field of view is taken from %s", lens->source);
     }
-    if (jitter) {
-        memcpy(c->jitter, jitter, sizeof c->jitter);
-    } else if (!camera_attr(f, "camera:jitter", 2, c->jitter) && !r->said_jitter) {
+    if (!has_jitter && !r->said_jitter) {
         r->said_jitter = true;
-        rl_report(r->setup.log, RL_VERBOSE, (rl_where){.file = rl_exr_path(file)},
+        rl_report(r->setup.log, RL_VERBOSE, where,
                   "no attribute camera:jitter: samples lie at the pixels' centres");
     }
 }
 
+/* The file whose header knows the camera: that of the depth, or where that knows nothing, the first that
+ * does. */
+static const rl_exr *camera_file(const rl_reader *r, const rl_frame *f, int *part)
+{
+    const bool forward_z = r->setup.manifest->camera.forward_z;
+    const rl_exr *main = f->files[f->main_file];
+    *part = f->main_part;
+    for (int i = -1; i < RL_MOST_FILES; i++) {
+        const rl_exr *file = i < 0 ? main : f->files[i];
+        double matrix[16];
+        rl_camera_lens lens;
+        if (!file)
+            continue;
+        rl_camera_header_lens(file, i < 0 ? *part : 0, forward_z, &lens);
+        if (rl_camera_header_matrix(file, i < 0 ? *part : 0, forward_z, matrix) ||
+            strcmp(lens.source, "screenWindowWidth")) {
+            *part = i < 0 ? *part : 0;
+            return file;
+        }
+    }
+    return main;
+}
+
 static rl_code read_camera(rl_reader *r, rl_frame *f, int file_number, rl_error *err)
 {
-    const rl_exr *file = f->files[f->main_file];
-    double header[16];
-    float header_f[16];
-    bool has = camera_attr(f, "worldToCamera", 16, header);
-    if (!has && r->setup.manifest->camera.matrix_source == RL_SOURCE_HEADER)
-        return rl_fail_file(err, RL_E_FORMAT, rl_exr_path(file),
-                            "the file has no attribute worldToCamera; give camera.matrix in the manifest");
-    for (int i = 0; i < 16 && has; i++)
-        header_f[i] = (float)header[i];
-    rl_camera_info c = {.display = {f->display_window.x0, f->display_window.y0,
-                                    f->display_window.x1 - f->display_window.x0 + 1,
-                                    f->display_window.y1 - f->display_window.y0 + 1}};
+    int part;
+    const rl_exr *file = camera_file(r, f, &part);
+    rl_camera_info c;
+    rl_camera_lens lens;
     rl_error inner = {0};
-    rl_code code = rl_manifest_view(r->setup.manifest, file_number, has ? header_f : NULL, c.view, &inner);
+    bool has_jitter;
+    double matrix[16];
+    /* The manifest may be a preset's: the file is what to look at. */
+    if (r->setup.manifest->camera.matrix_source == RL_SOURCE_HEADER &&
+        !rl_camera_header_matrix(file, part, r->setup.manifest->camera.forward_z, matrix))
+        return rl_fail_file(
+            err, RL_E_FORMAT, rl_exr_path(file),
+            "the file has no attribute worldToCamera; give camera.matrix in the manifest: 16 numbers, "
+            "world to camera, rows listed, for column vectors (how to get them: configs/captures.md)");
+    rl_code code = rl_camera_read(r->setup.manifest, file_number, file, part, &c, &lens, &has_jitter, &inner);
     if (!code) {
-        read_lens(r, f, file_number, &c);
+        report_camera(r, f, file_number, &lens, has_jitter);
         code = rl_camera_make(&c, &f->camera, &inner);
     }
     if (code)
@@ -191,6 +188,8 @@ static rl_code check_layers(rl_reader *r, rl_frame *f, rl_error *err)
         const rl_layer *layer = r->bindings[i].layer;
         const rl_exr *file = f->files[layer->pattern];
         int part = 0;
+        if (!layer->n_channels)
+            continue;
         rl_code code = rl_reader_find_part(layer, file, &part, err);
         if (!code)
             code = check_readable(layer, file, part, err);

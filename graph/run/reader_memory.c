@@ -29,6 +29,8 @@ rl_code rl_reader_memory(rl_reader *r, const rl_frame_data *d, rl_frame *f, rl_e
     code = rl_manifest_view(r->setup.manifest, f->number, header, c.view, err);
     const double *fov = code ? NULL : rl_manifest_fov_x(r->setup.manifest, f->number);
     const double *jitter = code ? NULL : rl_manifest_jitter(r->setup.manifest, f->number);
+    for (int i = 0; i < 2 && r->setup.manifest->camera.has_shift; i++)
+        c.screen_center[i] = r->setup.manifest->camera.shift[i] * c.screen_width;
     if (fov)
         c.fov_x = *fov;
     if (jitter)

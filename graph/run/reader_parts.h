@@ -24,7 +24,7 @@ struct rl_reader {
     rl_binding bindings[RL_MOST_BINDINGS]; /* depth first: the stencil needs it */
     int n_bindings;
     int depth, stencil; /* bindings, or -1 */
-    bool said_jitter, said_window;
+    bool said_jitter, said_window, said_normals, said_empty;
 };
 
 /* A frame's planes on the host while it is read. */

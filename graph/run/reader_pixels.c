@@ -2,6 +2,7 @@
 #include <string.h>
 
 #include "graph/base/alloc.h"
+#include "graph/run/normal_check.h"
 #include "graph/run/reader_parts.h"
 
 rl_code rl_reader_map(rl_reader *r, rl_frame *f, rl_frame_maps *maps, rl_error *err)
@@ -88,6 +89,7 @@ static rl_code read_group(group *g, rl_pool *pool, rl_error *err)
         for (int k = 0; k < b->layer->n_channels; k++) {
             float *p = g->maps->base[g->members[i]][k];
             rl_exr_plane plane = {.channel = b->layer->channels[k], .stride = (size_t)g->f->geometry.stride};
+            plane.bits = b->layer->hashed;
             if (b->is_stencil)
                 plane.ids = (uint32_t *)(void *)p;
             else
@@ -116,7 +118,7 @@ static rl_code collect_group(rl_reader *r, rl_frame *f, bool *done, int first, g
     rl_code code = rl_reader_find_part(r->bindings[first].layer, f->files[g->file], &g->part, err);
     for (int i = first; i < r->n_bindings && !code; i++) {
         int part = -1;
-        if (done[i] || r->bindings[i].layer->pattern != g->file)
+        if (done[i] || r->bindings[i].layer->pattern != g->file || !r->bindings[i].layer->n_channels)
             continue;
         code = rl_reader_find_part(r->bindings[i].layer, f->files[g->file], &part, err);
         if (code || part != g->part)
@@ -128,8 +130,60 @@ static rl_code collect_group(rl_reader *r, rl_frame *f, bool *done, int first, g
     return code;
 }
 
+/* A picture of nothing is a wrong layer as a rule. */
+static bool is_empty(const rl_frame *f, const float *depth)
+{
+    for (int y = 0; y < f->geometry.height; y++)
+        for (int x = 0; x < f->geometry.width; x++)
+            if (depth[(size_t)y * (size_t)f->geometry.stride + (size_t)x] > 0)
+                return false;
+    return true;
+}
+
+/* Whether the capture's conventions can be right, in the first frame that is read. */
+static void check_normals(rl_reader *r, const rl_frame *f, const rl_frame_maps *maps)
+{
+    int normal = -1;
+    for (int i = 0; i < r->n_bindings; i++)
+        normal = r->bindings[i].layer->id == RL_LAYER_NORMAL ? i : normal;
+    if (r->said_normals)
+        return;
+    if (is_empty(f, maps->base[r->depth][0])) { /* the next frame may tell more */
+        if (!r->said_empty)
+            rl_report(
+                r->setup.log, RL_WARNING, r->bindings[r->depth].layer->where,
+                "frame %d: no pixel shows a surface: the depth is nowhere above 0 and below `empty` (where a "
+                "file has -z, write layers.depth.negated: true)",
+                f->number);
+        r->said_empty = true;
+        return;
+    }
+    r->said_normals = true;
+    if (normal < 0)
+        return;
+    rl_normal_view view = {.depth = maps->base[r->depth][0],
+                           .stride = (size_t)f->geometry.stride,
+                           .width = f->geometry.width,
+                           .height = f->geometry.height,
+                           .x = f->data_window.x0,
+                           .y = f->data_window.y0,
+                           .camera = &f->camera};
+    const rl_layer *n = r->bindings[normal].layer, *d = r->bindings[r->depth].layer;
+    bool forward_z = r->setup.manifest->camera.forward_z;
+    rl_normal_check check;
+    rl_str text = {0};
+    for (int i = 0; i < 3; i++)
+        view.normal[i] = maps->base[normal][i];
+    rl_normal_check_run(&view, n, d, forward_z, &check);
+    if (rl_normal_check_advice(&check, n, d, forward_z, &text) && !text.failed)
+        rl_report(r->setup.log, RL_WARNING, n->where, "frame %d: %s", f->number, rl_str_text(&text));
+    rl_str_free(&text);
+}
+
 rl_code rl_reader_finish(rl_reader *r, rl_frame *f, rl_frame_maps *maps, rl_code code, rl_error *err)
 {
+    if (!code && !maps->error.code)
+        check_normals(r, f, maps);
     rl_code unmapped = unmap_planes(r, f, maps, code ? NULL : err);
     code = code ? code : unmapped;
     f->clamped = maps->clamped;
@@ -173,7 +227,7 @@ rl_code rl_reader_pixels(rl_reader *r, rl_frame *f, rl_pool *pool, rl_error *err
     bool stencil_done = false;
     for (int i = 0; i < r->n_bindings && !code; i++) {
         group g = {.r = r, .f = f, .maps = &maps};
-        if (done[i])
+        if (done[i] || !r->bindings[i].layer->n_channels) /* a constant stencil follows */
             continue;
         code = collect_group(r, f, done, i, &g, err);
         if (!code)

@@ -2,6 +2,7 @@
 #include "graph/run/session.h"
 
 #include <string.h>
+#include <strings.h>
 #include <unistd.h>
 
 #include "graph/base/alloc.h"
@@ -30,10 +31,11 @@ static rl_code read_pipeline(rl_session *s, rl_error *err)
     rl_code code;
     if (o->pipeline_text)
         code = rl_yaml_parse(&s->arena, o->pipeline_text, strlen(o->pipeline_text), "pipeline", &root, err);
-    else if (o->pipeline && rl_path_is_folder(o->pipeline))
-        code =
-            rl_fail_file(err, RL_E_USAGE, o->pipeline,
-                         "this is a folder, not a pipeline (`relit init` prints a pipeline for a capture)");
+    else if (o->pipeline &&
+             (rl_path_is_folder(o->pipeline) || !strcasecmp(rl_path_extension(o->pipeline), ".exr")))
+        code = rl_fail_file(err, RL_E_CONFIG, o->pipeline,
+                            "this is a capture, not a pipeline: `relit init %s` writes a pipeline for it",
+                            o->pipeline);
     else if (o->pipeline)
         code = rl_config_load(&s->arena, o->pipeline, &root, err);
     else
@@ -75,6 +77,8 @@ rl_code rl_session_open_variant(const rl_options *options, const char *variant, 
         code = rl_session_ambient(s, err);
     if (!code)
         code = rl_session_sequences(s, err);
+    if (!code)
+        code = rl_session_content(s, err);
     if (!code)
         code = rl_session_paths(s, err);
     if (!code)

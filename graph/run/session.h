@@ -54,7 +54,8 @@ typedef struct rl_sequence {
     uint64_t decode_bytes; /* that reading it takes besides its buffers */
     rl_reader *reader;
     rl_executor *executor; /* NULL until prepared */
-    bool has_last;         /* the frame that ran last, and may be the past of the next one */
+    uint64_t content; /* hash of the manifest, without paths and frames, and of the files of its lights */
+    bool has_last;    /* the frame that ran last, and may be the past of the next one */
     int last_number;
     camera_t last_camera;
 } rl_sequence;
@@ -67,6 +68,8 @@ struct rl_session {
     const rl_pipeline *pipeline;
     rl_ocio *ocio;
     const char *working;
+    uint64_t colors;   /* hash of the OCIO configuration and of the files that it names */
+    uint64_t content;  /* hash of the pipeline and of all files that it names, this configuration included */
     ambient_t ambient; /* in the working space */
     float *sky;        /* what surfaces mirror of it (kernels/shared.h), owned; NULL = nothing */
     size_t n_sky;
@@ -115,6 +118,10 @@ void rl_session_light_values(const rl_sequence *sequence, const camera_t *camera
 /* session_ambient.c: the pipeline's ambient light; reads its HDRI. */
 rl_code rl_session_ambient(rl_session *session, rl_error *err);
 
+/* session_content.c: finds the hashes of content. After all else: what is missing has been complained about.
+ */
+rl_code rl_session_content(rl_session *session, rl_error *err);
+
 /* session_compared.c: adds the hidden outputs of what is compared. */
 rl_code rl_session_compared(rl_session *session, rl_error *err);
 
@@ -128,6 +135,8 @@ void rl_sequence_close(rl_sequence *sequence);
 
 /* session_paths.c: no two outputs, captures or frames write one file. */
 rl_code rl_session_paths(rl_session *session, rl_error *err);
+/* Removes what a killed process left of the files that the session writes (leftovers.h). */
+void rl_session_clean(const rl_session *session);
 
 /* session_run.c (batches of frames: session_batch.c): runs the kernels on a loaded frame, and decides whether
  * history reaches it. `spans`: NULL, or plan->n_steps of them. */
@@ -143,8 +152,11 @@ rl_code rl_session_fit_buffers(rl_sequence *sequence, rl_frame *frame, rl_error 
 typedef struct rl_loaded {
     bool skipped; /* missing, and not to be written */
     bool held;    /* the layers are of frame `source`: no past of the next one */
+    bool broken;  /* its own files are missing, or no frame can be made of them */
     size_t source;
 } rl_loaded;
+rl_code rl_session_read(rl_session *session, rl_sequence *sequence, rl_frame *frame, int file_number,
+                        rl_error *err); /* its own files alone */
 void rl_session_load(rl_session *session, rl_sequence *sequence, size_t index, rl_frame *frame,
                      rl_loaded *out);
 /* Writes all outputs of a frame that ran; files[0…n_outputs-1] (may be NULL: memory was out) get the names of

@@ -28,7 +28,7 @@ static void batch_load(void *ctx, size_t item, int slot)
     f->number = b->q->frames.numbers[index];
     rl_session_stage(b->hooks, RL_LANE_READ, f);
     rl_session_load(b->s, b->q, index, f, &b->loaded[slot]);
-    rl_state_loaded(&b->state, slot, index, b->loaded[slot].source);
+    rl_state_loaded(&b->state, slot, index, &b->loaded[slot]);
     f->load_s = rl_state_now() - start;
     rl_session_span(b->hooks, b->q, f, RL_LANE_READ, "read", "decode", start);
 }
@@ -67,7 +67,11 @@ static void batch_write(void *ctx, size_t item, int slot)
     rl_session_stage(b->hooks, RL_LANE_WRITE, f);
     if (!f->error.code && work->write && !rl_state_writing(&b->state, slot, f->number, &f->error))
         rl_session_write_frame(b->s, b->q, f, b->hooks, &arena, files, &n_files, &f->error);
+    bool saves = b->state.slots[slot].saved.history != NULL;
+    double pictures = rl_state_now();
     rl_state_written(&b->state, work, slot, f);
+    if (saves)
+        rl_session_span(b->hooks, b->q, f, RL_LANE_WRITE, "checkpoint", "checkpoint", pictures);
     f->write_s = rl_state_now() - start;
     rl_session_span(b->hooks, b->q, f, RL_LANE_WRITE, "write", "write", start);
     rl_frame_release(f);
@@ -121,7 +125,7 @@ static rl_code run_frames(batch_state *b, bool *stopped, rl_error *err)
     rl_code code = rl_batch_run(&batch, &finished, err);
     *stopped = finished < b->state.n_work;
     if (!code)
-        rl_state_finish(&b->state, *stopped);
+        b->summary->stuck = (code = rl_state_finish(&b->state, *stopped, err)) != RL_OK;
     for (int i = 0; i < RL_MOST_IN_FLIGHT; i++)
         rl_frame_free(&b->frames[i]);
     return code;

@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include "graph/base/alloc.h"
+#include "graph/run/session_inputs.h"
 
 double rl_state_now(void)
 {
@@ -23,16 +24,25 @@ static rl_code path_of(const rl_sequence_state *st, rl_arena *arena, int frame, 
     return *path ? RL_OK : rl_fail_memory(err, 1);
 }
 
+static bool is_usable(rl_sequence_state *st, int frame)
+{
+    long i = rl_frames_find(&st->sequence->frames, frame);
+    return i >= 0 && rl_state_is_usable(st, (size_t)i);
+}
+
 /* Why a checkpoint is of no use here: "" when it is of use. */
-static void refusal(const rl_sequence_state *st, const rl_checkpoint *c, uint64_t chain, char *out,
-                    size_t size)
+static void refusal(rl_sequence_state *st, const rl_checkpoint *c, uint64_t chain, char *out, size_t size)
 {
     rl_identity_difference(&c->identity, &st->identity, out, size);
     if (!*out && c->chain != chain)
         strncpy(out, "input files of the frames up to it differ, or a frame failed then", size - 1);
+    /* A run that made the frame after all, and was stopped before it could say what history is now. */
+    if (!*out && !c->bytes && rl_ledger_find(st->ledger, c->frame)->kind != RL_LEDGER_FAILED &&
+        is_usable(st, c->frame))
+        strncpy(out, "its frame had failed, and has not since", size - 1);
 }
 
-static void judge(rl_sequence_state *st, int frame, uint64_t chain, bool *saved)
+static void judge(rl_sequence_state *st, int frame, uint64_t chain, bool *saved, bool *ended)
 {
     rl_arena arena = {0};
     rl_error err = {0};
@@ -47,6 +57,7 @@ static void judge(rl_sequence_state *st, int frame, uint64_t chain, bool *saved)
         rl_report(st->session->log, RL_NOTE, (rl_where){.file = path}, "this checkpoint is not used: %s",
                   why);
     *saved = !err.code && !*why;
+    *ended = *saved && !c.bytes;
     rl_checkpoint_free(&c);
     rl_arena_free(&arena);
 }
@@ -59,8 +70,11 @@ rl_code rl_state_find_checkpoints(rl_sequence_state *st, size_t from, size_t to,
     rl_code code = rl_checkpoint_list(&st->arena, st->folder, st->name, &frames, &n, err);
     for (size_t k = 0; k < n && !code; k++) {
         long i = rl_frames_find(&st->sequence->frames, frames[k]);
+        bool ended = false;
         if (i >= (long)from && i < (long)to)
-            judge(st, frames[k], chains[i], &saved[i]);
+            judge(st, frames[k], chains[i], &saved[i], &ended);
+        if (ended && i + 1 == (long)st->first)
+            st->cut[st->first] = true;
     }
     return code;
 }
@@ -72,6 +86,18 @@ static void remove_one(const rl_sequence_state *st, int frame)
     if (path)
         unlink(path);
     rl_arena_free(&arena);
+}
+
+/* The last one before a frame that cannot be used: from there it goes on when its files are repaired. */
+static bool before_broken(const rl_sequence_state *st, const bool *saved, size_t i)
+{
+    for (size_t k = i + 1; k < st->last; k++) {
+        if (st->usable[k] == RL_NOT_USABLE)
+            return true;
+        if (saved[k])
+            return false;
+    }
+    return false;
 }
 
 void rl_state_drop_checkpoints(rl_sequence_state *st, const bool *saved)
@@ -88,7 +114,7 @@ void rl_state_drop_checkpoints(rl_sequence_state *st, const bool *saved)
         long i = rl_frames_find(&st->sequence->frames, frames[k]);
         if (i < (long)(st->first + st->warm) || i >= (long)st->last)
             continue; /* another shard's */
-        bool used = saved[i] && (size_t)i == newest;
+        bool used = saved[i] && ((size_t)i == newest || before_broken(st, saved, (size_t)i));
         for (size_t w = 0; w < st->n_work; w++)
             used |= st->work[w].start == RL_START_CHECKPOINT && st->work[w].frame == (size_t)i + 1;
         if (!used)
@@ -220,32 +246,59 @@ static bool stored_already(const rl_sequence_state *st)
     return st->n_kept && st->kept[st->n_kept - 1] == st->last_frame;
 }
 
-void rl_state_finish(rl_sequence_state *st, bool stopped)
+/* The state after the last frame, where somebody goes on from it. */
+static rl_code store_end(rl_sequence_state *st, bool stopped, rl_error *err)
 {
-    rl_error err = {0};
     rl_checkpoint c = {0};
-    bool ran = st->history && st->n_work > 0 && !stored_already(st);
-    if (ran && st->chained && (stopped || st->hands_over) && !take(st, &c, st->chain, &err))
-        store(st, &c, &err);
-    /* The next shard must not wait for history that a frame which failed or was held has ended. */
-    if (ran && !st->chained && !stopped && st->hands_over) {
+    rl_code code = RL_OK;
+    bool end = st->last_frame == st->sequence->frames.numbers[st->last - 1],
+         hands_over = end && st->hands_over;
+    if (stored_already(st))
+        return RL_OK;
+    if (st->chained && (stopped || hands_over)) {
+        code = take(st, &c, st->chain, err);
+    } else if (!st->chained && !stopped && hands_over) {
+        /* The next shard must not wait for history that a frame which failed or was held has ended. */
         c = (rl_checkpoint){.identity = st->identity, .chain = st->chain, .frame = st->last_frame};
-        store(st, &c, &err);
+    } else {
+        return RL_OK;
     }
+    if (!code)
+        code = store(st, &c, err);
     rl_checkpoint_free(&c);
-    if (err.code)
-        rl_report(st->session->log, RL_WARNING, (rl_where){.file = err.file},
-                  "no checkpoint could be written: %s", err.text);
-    if (stopped || st->failed)
-        return;
+    return code;
+}
+
+/* All is there: nobody goes on from inside. */
+static void drop_all(rl_sequence_state *st)
+{
     int *frames;
     size_t n;
-    if (rl_checkpoint_list(&st->arena, st->folder, st->name, &frames, &n, &err))
+    rl_error ignored = {0};
+    if (rl_checkpoint_list(&st->arena, st->folder, st->name, &frames, &n, &ignored))
         return;
-    for (size_t k = 0; k < n; k++) { /* all is there: nobody goes on from inside */
+    for (size_t k = 0; k < n; k++) {
         long i = rl_frames_find(&st->sequence->frames, frames[k]);
-        bool end = i + 1 == (long)st->last && st->hands_over;
-        if (i >= (long)(st->first + st->warm) && i < (long)st->last && !end)
+        bool last = i + 1 == (long)st->last && st->hands_over;
+        if (i >= (long)(st->first + st->warm) && i < (long)st->last && !last)
             remove_one(st, frames[k]);
     }
+}
+
+rl_code rl_state_finish(rl_sequence_state *st, bool stopped, rl_error *err)
+{
+    rl_error why = {0};
+    rl_code code = st->history && st->n_work > 0 ? store_end(st, stopped, &why) : RL_OK;
+    if (code && (stopped || !st->hands_over)) {
+        rl_report(st->session->log, RL_WARNING, (rl_where){.file = why.file},
+                  "no checkpoint could be written: %s", why.text);
+        code = RL_OK;
+    }
+    if (code)
+        return rl_fail_file(err, code, why.file,
+                            "the next shard cannot go on from here: %s (--resume hands over once more)",
+                            why.text);
+    if (!stopped && !st->failed)
+        drop_all(st);
+    return RL_OK;
 }

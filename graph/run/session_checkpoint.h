@@ -9,11 +9,12 @@ extern "C" {
 #endif
 
 double rl_state_now(void); /* s on the monotonic clock */
-/* saved[i] for frames from…to-1 whose checkpoint is there and of this run; says why others are refused. */
+/* saved[i] for frames from…to-1 whose checkpoint is there and of this run; says why others are refused. One
+ * without history before this run's first frame cuts that. */
 rl_code rl_state_find_checkpoints(rl_sequence_state *state, size_t from, size_t to, const uint64_t *chains,
                                   bool *saved, rl_error *err);
 /* Removes checkpoints inside of this run's frames that nobody will go on from: of the `saved` ones those that
- * the work needs stay, and the newest. */
+ * the work needs stay, the newest, and the last before a frame that cannot be used. */
 void rl_state_drop_checkpoints(rl_sequence_state *state, const bool *saved);
 
 /* All of the checkpoint after a frame; an error when it is not of this run. */

@@ -2,7 +2,6 @@
 #include <string.h>
 #include <xxhash.h>
 
-#include "graph/base/file.h"
 #include "graph/run/kernel_source.h"
 #include "graph/run/session_state.h"
 
@@ -19,38 +18,18 @@ static uint64_t add_bytes(uint64_t hash, const void *data, size_t n)
 static uint64_t hash_pipeline(const rl_session *s)
 {
     const rl_options *o = &s->options;
-    uint64_t h = add_bytes(0, &s->pipeline->hash, sizeof s->pipeline->hash);
+    uint64_t h = add_bytes(0, &s->content, sizeof s->content);
     h = add_text(h, s->pipeline->name);
     for (size_t i = 0; i < s->n_outputs; i++) /* --only and --dump choose them */
         h = add_text(h, s->outputs[i].spec->name);
     return add_bytes(h, o->crop, sizeof o->crop);
 }
 
-/* The manifest, whatever folder it lies in and however many frames it lists: the frames are in the chain, and
- * a capture that grew can be gone on with. */
-static rl_code hash_capture(const rl_session *s, const rl_sequence *q, uint64_t *out, rl_error *err)
+/* How its layers become what kernels get is said by the manifest and the colour configuration. */
+static uint64_t hash_capture(const rl_session *s, const rl_sequence *q)
 {
-    rl_arena arena = {0};
-    rl_str text = {0};
-    rl_manifest m = *q->manifest;
-    rl_pattern *patterns = rl_arena_array(&arena, (size_t)m.n_patterns + 1, sizeof *patterns);
-    for (int i = 0; patterns && i < m.n_patterns; i++) {
-        patterns[i] = m.patterns[i];
-        patterns[i].path = rl_path_name(patterns[i].path);
-    }
-    m.patterns = patterns;
-    m.frames = (rl_frames){0};
-    if (patterns)
-        rl_manifest_print(&m, &text);
-    bool failed = !patterns || text.failed;
-    uint64_t h = add_text(0, rl_str_text(&text));
-    char colors[256];
-    rl_ocio_fingerprint(s->ocio, colors, sizeof colors);
-    h = add_text(add_text(h, colors), s->working);
-    rl_str_free(&text);
-    rl_arena_free(&arena);
-    *out = h;
-    return failed ? rl_fail_memory(err, 1) : RL_OK;
+    uint64_t h = add_bytes(0, &q->content, sizeof q->content);
+    return add_text(add_bytes(h, &s->colors, sizeof s->colors), s->working);
 }
 
 static rl_code hash_plan(const rl_sequence *q, uint64_t *out, rl_error *err)
@@ -103,9 +82,8 @@ rl_code rl_session_identity(const rl_session *s, const rl_sequence *q, rl_identi
     out->part[RL_ID_PIPELINE] = hash_pipeline(s);
     out->part[RL_ID_DEVICE] =
         add_text(add_text(add_text(add_text(0, d->name), d->platform), d->version), d->driver);
-    rl_code code = hash_capture(s, q, &out->part[RL_ID_CAPTURE], err);
-    if (!code)
-        code = hash_plan(q, &out->part[RL_ID_PLAN], err);
+    out->part[RL_ID_CAPTURE] = hash_capture(s, q);
+    rl_code code = hash_plan(q, &out->part[RL_ID_PLAN], err);
     if (!code)
         code = hash_kernels(s, q, &out->part[RL_ID_KERNELS], err);
     return code;

@@ -2,7 +2,7 @@
 #include "graph/run/session.h"
 
 /* The frame of a number, under the files of another one when that is held. */
-static rl_code load_frame(rl_session *s, rl_sequence *q, rl_frame *f, int file_number, rl_error *err)
+rl_code rl_session_read(rl_session *s, rl_sequence *q, rl_frame *f, int file_number, rl_error *err)
 {
     f->nonfinite = f->clamped = 0;
     rl_code code = rl_reader_open(q->reader, file_number, f, err);
@@ -18,7 +18,7 @@ static void hold_frame(rl_session *s, rl_sequence *q, size_t index, rl_frame *f,
     rl_where where = {.file = why.file};
     for (size_t k = index; k-- > 0;) {
         f->error = (rl_error){0};
-        load_frame(s, q, f, q->frames.numbers[k], &f->error);
+        rl_session_read(s, q, f, q->frames.numbers[k], &f->error);
         if (rl_reader_missed(f->error.code))
             continue;
         rl_report(s->log, RL_WARNING, where, "frame %d holds the layers of frame %d: %s", f->number,
@@ -38,7 +38,8 @@ void rl_session_load(rl_session *s, rl_sequence *q, size_t index, rl_frame *f, r
     f->error = (rl_error){0};
     f->run_s = f->write_s = 0;
     f->clipped = 0;
-    load_frame(s, q, f, f->number, &f->error);
+    rl_session_read(s, q, f, f->number, &f->error);
+    out->broken = f->error.code != RL_OK;
     if (!rl_reader_missed(f->error.code))
         return;
     if (s->options.on_missing == RL_MISSING_HOLD) {

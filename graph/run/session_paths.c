@@ -7,6 +7,7 @@
 
 #include "graph/base/alloc.h"
 #include "graph/base/file.h"
+#include "graph/run/leftovers.h"
 #include "graph/run/session.h"
 
 enum { INPUT = 1 << 30 }; /* an `output` from here on is a pattern of the capture, which is read */
@@ -160,4 +161,28 @@ rl_code rl_session_paths(rl_session *s, rl_error *err)
     rl_free(l.list);
     free(out);
     return code;
+}
+
+void rl_session_clean(const rl_session *s)
+{
+    const char *out = s->options.out ? s->options.out : "out";
+    rl_arena arena = {0};
+    size_t n = 0, most = 0;
+    for (size_t q = 0; q < s->n_sequences; q++)
+        most += s->sequences[q].frames.n * s->n_outputs;
+    const char **paths = rl_arena_array(&arena, most, sizeof *paths);
+    for (size_t q = 0; paths && q < s->n_sequences; q++) {
+        const rl_sequence *sequence = &s->sequences[q];
+        for (size_t i = 0; i < sequence->frames.n * s->n_outputs; i++) {
+            const char *name;
+            if (rl_output_path(&arena, s->outputs[i % s->n_outputs].spec, sequence->manifest->name,
+                               sequence->frames.numbers[i / s->n_outputs], s->variant, &name, NULL))
+                continue;
+            paths[n] = rl_path_join(&arena, out, name);
+            n += paths[n] != NULL;
+        }
+    }
+    if (paths)
+        rl_leftovers_remove(paths, n);
+    rl_arena_free(&arena);
 }

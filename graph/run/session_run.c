@@ -1,4 +1,5 @@
 /* A frame through a session: its kernels, its files, and one at a time. */
+#include <inttypes.h>
 #include <limits.h>
 #include <math.h>
 #include <string.h>
@@ -144,18 +145,19 @@ static rl_code write_output(rl_session *s, rl_sequence *q, rl_frame *f, size_t o
     if (!code)
         code = rl_sink_write(path, &s->outputs[output], wr.images, w->n_layers, frame, s->pool, &f->clipped,
                              err);
-    for (size_t i = 0; i < w->n_layers; i++) {
-        rl_code unmapped = wr.memory[i] ? rl_memory_unmap(wr.memory[i], code ? NULL : err) : RL_OK;
-        code = code ? code : unmapped;
-    }
+    for (size_t i = 0; i < w->n_layers; i++)
+        if (wr.memory[i]) /* what was read has been read: a device that fails now is told of at its next call
+                           */
+            (void)rl_memory_unmap(wr.memory[i], NULL);
     return code;
 }
 
 rl_code rl_session_write_frame(rl_session *s, rl_sequence *q, rl_frame *f, const rl_run_hooks *hooks,
                                rl_arena *arena, const char **files, size_t *n_files, rl_error *err)
 {
-    const char *pipeline = rl_arena_printf(arena, "%s %016llx", s->pipeline->name, s->pipeline->hash);
-    if (!pipeline || !files)
+    const char *pipeline = rl_arena_printf(arena, "%s %016" PRIx64, s->pipeline->name, s->content);
+    const char *capture = rl_arena_printf(arena, "%s %016" PRIx64, q->manifest->name, q->content);
+    if (!pipeline || !capture || !files)
         return rl_fail_memory(err, s->n_outputs * sizeof *files);
     rl_sink_image stencil = {0};
     rl_memory *memory = NULL;
@@ -169,7 +171,8 @@ rl_code rl_session_write_frame(rl_session *s, rl_sequence *q, rl_frame *f, const
                            .source = f->files[f->main_file],
                            .source_part = f->main_part,
                            .fps = q->manifest->fps,
-                           .pipeline = pipeline};
+                           .pipeline = pipeline,
+                           .capture = capture};
     for (size_t i = 0; i < s->n_outputs && !code; i++) {
         const char *name = NULL;
         double start = rl_state_now();
@@ -182,10 +185,13 @@ rl_code rl_session_write_frame(rl_session *s, rl_sequence *q, rl_frame *f, const
             code = write_output(s, q, f, i, &frame, path, arena, err);
         if (!code)
             files[(*n_files)++] = path;
-        rl_session_span(hooks, q, f, RL_LANE_WRITE, "encode", s->outputs[i].spec->name, start);
+        const char *spec = s->outputs[i].spec->name,
+                   *whole = s->variant ? rl_arena_printf(arena, "%s/%s", s->variant, spec) : spec;
+        rl_session_span(hooks, q, f, RL_LANE_WRITE, "encode", whole ? whole : spec, start);
     }
-    rl_code unmapped = memory ? rl_memory_unmap(memory, code ? NULL : err) : RL_OK;
-    return code ? code : unmapped;
+    if (memory)
+        (void)rl_memory_unmap(memory, NULL);
+    return code;
 }
 
 /* ---- one frame -------------------------------------------------------------------------------------------

@@ -11,6 +11,7 @@
 #include "graph/base/file.h"
 #include "graph/run/leftovers.h"
 #include "graph/run/session_checkpoint.h"
+#include "graph/run/session_inputs.h"
 
 /* ---- chains ----------------------------------------------------------------------------------------------
  */
@@ -21,51 +22,25 @@ static uint64_t extend(uint64_t chain, int frame, uint64_t content)
     return XXH3_64bits(link, sizeof link);
 }
 
-static rl_inputs own_inputs(const rl_sequence_state *st, size_t i)
+/* Whether frame i, as far as its files tell, ends history. Another shard's frame that is not there may be one
+ * that is still waited for: its shard says by a checkpoint without history that it has not come. */
+static bool ends_history(rl_sequence_state *st, size_t i)
 {
-    const rl_sequence *q = st->sequence;
-    rl_arena arena = {0};
-    const char *paths[RL_MOST_FILES];
-    size_t n;
-    rl_inputs in = {.missing = true};
-    if (!rl_reader_paths(q->reader, q->frames.numbers[i], &arena, paths, &n, NULL))
-        in = rl_ledger_inputs(st->ledger, q->frames.numbers[i], paths, n);
-    rl_arena_free(&arena);
-    return in;
+    bool waited_for = i + 1 == st->first && rl_state_is_missing(st, i) &&
+                      rl_ledger_find(st->ledger, st->sequence->frames.numbers[i])->kind == RL_LEDGER_NONE;
+    return !waited_for && !rl_state_is_usable(st, i);
 }
 
-/* A held frame is made of its own broken files, if there are any, and of those of the frame that it holds. */
-static uint64_t held_content(const rl_inputs *own, const rl_inputs *source)
+/* What the chains of frames from…to-1 will be, behind those of begin…from-1, if no frame fails of which the
+ * ledger does not say so already. A frame whose own files cannot be used has no history and ends it: it
+ * fails, or is skipped, or another is held there. */
+static void expect_chains(rl_sequence_state *st, size_t begin, size_t from, size_t to, uint64_t *chains)
 {
-    uint64_t both[2] = {own->content, source->content};
-    return XXH3_64bits(both, sizeof both);
-}
-
-/* What frame i will be made of, for all that can be told without decoding. */
-static rl_inputs expected_inputs(const rl_sequence_state *st, size_t i)
-{
-    rl_inputs in = own_inputs(st, i);
-    if (!in.missing || st->session->options.on_missing != RL_MISSING_HOLD)
-        return in;
-    for (size_t k = i; k-- > 0;) {
-        rl_inputs source = own_inputs(st, k);
-        if (source.missing)
-            continue;
-        in.content = held_content(&in, &source);
-        break;
-    }
-    return in;
-}
-
-/* What the chains of frames from…to-1 will be if none of them fails; a missing frame ends history. */
-static void expect_chains(rl_sequence_state *st, size_t from, size_t to, uint64_t *chains, bool *missing)
-{
-    uint64_t chain = st->root;
+    uint64_t chain = from > begin ? chains[from - 1] : st->root;
     for (size_t i = from; i < to; i++) {
-        rl_inputs in = expected_inputs(st, i);
-        missing[i] = in.missing;
-        st->cut[i] |= i > from && missing[i - 1];
-        chain = extend(st->cut[i] ? st->root : chain, st->sequence->frames.numbers[i], in.content);
+        st->cut[i] |= !rl_state_is_usable(st, i) || (i > begin && ends_history(st, i - 1));
+        chain = extend(st->cut[i] ? st->root : chain, st->sequence->frames.numbers[i],
+                       rl_state_expected_content(st, i));
         chains[i] = chain;
     }
 }
@@ -90,14 +65,15 @@ static bool pictures_exist(rl_sequence_state *st, int frame)
 }
 
 /* Pictures of this run's frames that need not be made again. */
-static void find_done(rl_sequence_state *st, const uint64_t *chains, const bool *missing, bool *needed)
+static void find_done(rl_sequence_state *st, const uint64_t *chains, bool *needed)
 {
     size_t others = 0;
     for (size_t i = st->first + st->warm; i < st->last; i++) {
         int frame = st->sequence->frames.numbers[i];
         const rl_ledger_line *line = rl_ledger_find(st->ledger, frame);
         bool there = line->kind == RL_LEDGER_DONE && pictures_exist(st, frame);
-        if (missing[i] && st->session->options.on_missing == RL_MISSING_SKIP)
+        bool skips = st->session->options.on_missing == RL_MISSING_SKIP;
+        if (skips && rl_state_is_missing(st, i))
             needed[i] = false;
         else
             needed[i] = !there || line->chain != chains[i];
@@ -192,23 +168,24 @@ static rl_code decide(rl_sequence_state *st, rl_error *err)
 {
     size_t n = st->sequence->frames.n;
     uint64_t *chains = rl_arena_array(&st->arena, n + 1, sizeof *chains);
-    bool *missing = rl_arena_array(&st->arena, n + 1, sizeof *missing);
     bool *needed = rl_arena_array(&st->arena, n + 1, sizeof *needed);
     bool *saved = rl_arena_array(&st->arena, n + 1, sizeof *saved);
     st->work = rl_arena_array(&st->arena, n + 1, sizeof *st->work);
-    if (!chains || !missing || !needed || !saved || !st->work)
+    if (!chains || !needed || !saved || !st->work)
         return rl_fail_memory(err, n * sizeof *chains);
     bool resume = st->session->options.resume;
     size_t begin = history_begins(st);
     for (size_t i = st->first + st->warm; i < st->last; i++)
         needed[i] = true;
-    rl_code code = RL_OK;
-    if (resume || begin < st->first)
-        expect_chains(st, begin, resume ? st->last : st->first, chains, missing);
-    if (resume)
-        find_done(st, chains, missing, needed);
-    if (!code && st->history)
-        code = rl_state_find_checkpoints(st, begin, resume ? st->last : st->first, chains, saved, err);
+    expect_chains(st, begin, begin, st->first, chains);
+    rl_code code = st->history ? rl_state_find_checkpoints(st, begin, st->first, chains, saved, err) : RL_OK;
+    st->cut[st->first] |= begin < st->first && ends_history(st, st->first - 1);
+    if (resume && !code) {
+        expect_chains(st, begin, st->first, st->last, chains);
+        find_done(st, chains, needed);
+        if (st->history)
+            code = rl_state_find_checkpoints(st, st->first, st->last, chains, saved, err);
+    }
     if (code)
         return code;
     make_work(st, needed, saved);
@@ -258,8 +235,10 @@ rl_code rl_sequence_state_begin(rl_sequence_state *st, rl_session *s, size_t seq
     st->folder = rl_path_join(&st->arena, s->options.out ? s->options.out : "out", ".relit");
     st->name = rl_ledger_name(&st->arena, q->manifest->name);
     st->cut = rl_arena_array(&st->arena, q->frames.n + 1, sizeof *st->cut);
+    st->usable = rl_arena_array(&st->arena, q->frames.n + 1, sizeof *st->usable);
+    st->inputs = rl_arena_array(&st->arena, q->frames.n + 1, sizeof *st->inputs);
     st->kept = rl_arena_array(&st->arena, q->frames.n + 1, sizeof *st->kept);
-    if (!st->folder || !st->name || !st->cut || !st->kept)
+    if (!st->folder || !st->name || !st->cut || !st->usable || !st->inputs || !st->kept)
         return rl_fail_memory(err, q->frames.n * sizeof *st->kept);
     find_range(st, sequence);
     if (s->options.shard[1])
@@ -288,14 +267,16 @@ void rl_sequence_state_end(rl_sequence_state *st)
 /* ---- the stages ------------------------------------------------------------------------------------------
  */
 
-void rl_state_loaded(rl_sequence_state *st, int slot, size_t index, size_t source)
+void rl_state_loaded(rl_sequence_state *st, int slot, size_t index, const rl_loaded *loaded)
 {
-    rl_inputs *in = &st->slots[slot].inputs;
-    *in = own_inputs(st, index);
-    st->slots[slot].content = in->content;
-    if (source != index) {
-        rl_inputs other = own_inputs(st, source);
-        st->slots[slot].content = held_content(in, &other);
+    rl_slot_state *s = &st->slots[slot];
+    s->inputs = rl_state_own_inputs(st, index);
+    s->inputs.broken = loaded->broken && !s->inputs.missing;
+    s->content = s->inputs.content;
+    s->alone = loaded->broken;
+    if (loaded->source != index) {
+        rl_inputs other = rl_state_own_inputs(st, loaded->source);
+        s->content = rl_state_held_content(&s->inputs, &other);
     }
 }
 
@@ -310,19 +291,20 @@ void rl_state_ready(rl_sequence_state *st, const rl_work *w, int slot, bool *res
     slot_state->saved_s = 0;
     if (w->start == RL_START_CHECKPOINT)
         rl_state_restore(st, numbers[w->frame - 1], restored, previous, camera, err);
-    bool alone = !st->chained || st->cut[w->frame];
-    uint64_t before = alone ? st->root : st->chain;
-    slot_state->chain = extend(before, numbers[w->frame], slot_state->content);
-    slot_state->hoped = slot_state->inputs.missing
-                            ? slot_state->chain
-                            : extend(before, numbers[w->frame], slot_state->inputs.content);
+    if (st->usable[w->frame] == RL_NOT_USABLE && !slot_state->alone) /* the work was made without it */
+        rl_fail(err, RL_E_IO, RL_NOWHERE,
+                "the files of frame %d could not be used when the run began, and can be now; --resume makes "
+                "it",
+                numbers[w->frame]);
+    bool alone = !st->chained || st->cut[w->frame] || slot_state->alone;
+    slot_state->chain = extend(alone ? st->root : st->chain, numbers[w->frame], slot_state->content);
 }
 
 void rl_state_ran(rl_sequence_state *st, int slot, const rl_frame *f, bool keeps)
 {
     rl_slot_state *slot_state = &st->slots[slot];
     st->chained = keeps;
-    st->chain = keeps ? slot_state->chain : slot_state->hoped;
+    st->chain = slot_state->chain;
     st->last_frame = f->number;
     st->since++;
     if (keeps && st->history && rl_state_is_due(st))

@@ -17,12 +17,14 @@
 extern "C" {
 #endif
 
+typedef enum rl_usable { RL_USABLE_UNKNOWN, RL_USABLE, RL_NOT_USABLE } rl_usable;
+
 /* What belongs to a frame in flight. */
 typedef struct rl_slot_state {
     rl_inputs inputs; /* its own files */
     uint64_t content; /* theirs, and of the frame that it holds */
     uint64_t chain;
-    uint64_t hoped;      /* its chain if its own files could be used */
+    bool alone;          /* no history reaches it: its own files cannot be used */
     rl_checkpoint saved; /* history NULL: none to be written */
     double saved_s;      /* seconds that taking it cost */
 } rl_slot_state;
@@ -39,6 +41,8 @@ typedef struct rl_sequence_state {
     size_t first, last; /* indices of the sequence's frames: this run's, warm-up included */
     size_t warm;        /* so many of them are warm-up */
     bool *cut;          /* [frames.n]: no history reaches it, for all that is known before it runs */
+    rl_usable *usable;  /* [frames.n]: whether its own files can be used (session_inputs.h), and */
+    rl_inputs *inputs;  /* [frames.n], where that is known: what they were when the run began */
     rl_ledger *ledger;
     rl_work *work;
     size_t n_work, n_write; /* frames to be run; of them to be written */
@@ -80,11 +84,10 @@ rl_code rl_sequence_state_begin(rl_sequence_state *state, rl_session *session, s
                                 rl_error *err);
 void rl_sequence_state_end(rl_sequence_state *state);
 
-/* The stages, for work item `w` in a slot. loaded: frame `index` was read from the files of frame `source`
- * (another one when it is held), or could not be. ready: before its kernels, an error or not; tells whether
- * history was loaded from a checkpoint, of which frame and camera. ran: after them; `keeps`: the next frame
- * may use its history. */
-void rl_state_loaded(rl_sequence_state *state, int slot, size_t index, size_t source);
+/* The stages, for work item `w` in a slot. loaded: what became of reading frame `index`. ready: before its
+ * kernels, an error or not; tells whether history was loaded from a checkpoint, of which frame and camera.
+ * ran: after them; `keeps`: the next frame may use its history. */
+void rl_state_loaded(rl_sequence_state *state, int slot, size_t index, const rl_loaded *loaded);
 void rl_state_ready(rl_sequence_state *state, const rl_work *w, int slot, bool *restored, int *previous,
                     camera_t *camera, rl_error *err);
 void rl_state_ran(rl_sequence_state *state, int slot, const rl_frame *frame, bool keeps);
@@ -92,8 +95,8 @@ void rl_state_ran(rl_sequence_state *state, int slot, const rl_frame *frame, boo
 rl_code rl_state_writing(rl_sequence_state *state, int slot, int frame, rl_error *err);
 void rl_state_written(rl_sequence_state *state, const rl_work *w, int slot, const rl_frame *frame);
 /* After the last frame: a checkpoint there when somebody may go on from it, none left over when nobody will.
- */
-void rl_state_finish(rl_sequence_state *state, bool stopped);
+ * An error when the next shard waits for one that cannot be written. */
+rl_code rl_state_finish(rl_sequence_state *state, bool stopped, rl_error *err);
 
 #ifdef __cplusplus
 }

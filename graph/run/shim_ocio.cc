@@ -2,9 +2,12 @@
 
 #include <OpenColorIO/OpenColorIO.h>
 
+#include <algorithm>
 #include <cstring>
 #include <exception>
 #include <new>
+#include <string>
+#include <vector>
 
 #include "graph/base/alloc.h"
 #include "graph/run/shim_ocio_ops.hh"
@@ -79,21 +82,6 @@ extern "C" void rl_ocio_free(rl_ocio **ocio)
     destroy(ocio);
 }
 
-extern "C" void rl_ocio_fingerprint(const rl_ocio *ocio, char *out, size_t size)
-{
-    const char *id = "";
-    try {
-        id = ocio->config->getCacheID();
-    } catch (...) {
-        try { /* a file that it refers to is missing: the text of the configuration alone */
-            id = ocio->config->getCacheID(OCIO::ConstContextRcPtr());
-        } catch (...) {
-        }
-    }
-    std::strncpy(out, id ? id : "", size - 1);
-    out[size - 1] = 0;
-}
-
 extern "C" rl_code rl_ocio_validate(const rl_ocio *ocio, rl_error *err)
 {
     try {
@@ -140,23 +128,99 @@ static const char *name_at(const OCIO::Config &config, rl_ocio_list what, const 
     return "";
 }
 
+/* name(i) for i < n, copied into the arena. */
+template <typename T>
+static rl_code copy_names(size_t n, T name, rl_arena *arena, rl_ocio_names *out, rl_error *err)
+{
+    auto names = static_cast<const char **>(rl_arena_array(arena, n + 1, sizeof(char *)));
+    if (!names)
+        return rl_fail_memory(err, n * sizeof(char *));
+    for (size_t i = 0; i < n; i++)
+        if (!(names[i] = rl_arena_strdup(arena, name(i))))
+            return rl_fail_memory(err, 0);
+    out->names = names;
+    out->n = n;
+    return RL_OK;
+}
+
 extern "C" rl_code rl_ocio_list_names(const rl_ocio *ocio, rl_ocio_list what, const char *of, rl_arena *arena,
                                       rl_ocio_names *out, rl_error *err)
 {
     *out = rl_ocio_names{};
     try {
-        int n = count_names(*ocio->config, what, of);
-        auto names = static_cast<const char **>(rl_arena_array(arena, size_t(n) + 1, sizeof(char *)));
-        if (!names)
-            return rl_fail_memory(err, size_t(n) * sizeof(char *));
-        for (int i = 0; i < n; i++) {
-            names[i] = rl_arena_strdup(arena, name_at(*ocio->config, what, of, i));
-            if (!names[i])
-                return rl_fail_memory(err, 0);
-        }
-        out->names = names;
-        out->n = size_t(n);
+        const OCIO::Config &config = *ocio->config;
+        auto name = [&](size_t i) { return name_at(config, what, of, int(i)); };
+        return copy_names(size_t(count_names(config, what, of)), name, arena, out, err);
+    } catch (...) {
+        return rl_shim_caught(err);
+    }
+}
+
+/* ---- content ------------------------------------------------------------------------------------------ */
+
+extern "C" rl_code rl_ocio_fingerprint(const rl_ocio *ocio, char *out, size_t size, rl_error *err)
+{
+    try { /* with a context it would have the inodes of files in it, which differ from machine to machine */
+        const char *id = ocio->config->getCacheID(OCIO::ConstContextRcPtr());
+        std::strncpy(out, id ? id : "", size - 1);
+        out[size - 1] = 0;
         return RL_OK;
+    } catch (...) {
+        return rl_shim_caught(err);
+    }
+}
+
+using file_names = std::vector<std::string>;
+
+static void add_files(const OCIO::Config &config, const OCIO::ConstTransformRcPtr &transform, file_names &out)
+{
+    if (auto group = OCIO::DynamicPtrCast<const OCIO::GroupTransform>(transform))
+        for (int i = 0; i < group->getNumTransforms(); i++)
+            add_files(config, group->getTransform(i), out);
+    if (auto file = OCIO::DynamicPtrCast<const OCIO::FileTransform>(transform)) {
+        try {
+            std::string path = config.getCurrentContext()->resolveFileLocation(file->getSrc());
+            if (std::find(out.begin(), out.end(), path) == out.end())
+                out.push_back(path);
+        } catch (const OCIO::Exception &) { /* not there: whoever uses the transform will hear of it */
+        }
+    }
+}
+
+static file_names all_files(const OCIO::Config &config)
+{
+    file_names out;
+    for (int i = 0; i < count_names(config, RL_OCIO_SPACES, nullptr); i++) {
+        auto space = config.getColorSpace(name_at(config, RL_OCIO_SPACES, nullptr, i));
+        add_files(config, space->getTransform(OCIO::COLORSPACE_DIR_TO_REFERENCE), out);
+        add_files(config, space->getTransform(OCIO::COLORSPACE_DIR_FROM_REFERENCE), out);
+    }
+    for (int i = 0; i < config.getNumLooks(); i++) {
+        auto look = config.getLook(config.getLookNameByIndex(i));
+        add_files(config, look->getTransform(), out);
+        add_files(config, look->getInverseTransform(), out);
+    }
+    for (int i = 0; i < config.getNumViewTransforms(); i++) {
+        auto view = config.getViewTransform(config.getViewTransformNameByIndex(i));
+        add_files(config, view->getTransform(OCIO::VIEWTRANSFORM_DIR_TO_REFERENCE), out);
+        add_files(config, view->getTransform(OCIO::VIEWTRANSFORM_DIR_FROM_REFERENCE), out);
+    }
+    for (int i = 0; i < config.getNumNamedTransforms(OCIO::NAMEDTRANSFORM_ALL); i++) {
+        auto named =
+            config.getNamedTransform(config.getNamedTransformNameByIndex(OCIO::NAMEDTRANSFORM_ALL, i));
+        add_files(config, named->getTransform(OCIO::TRANSFORM_DIR_FORWARD), out);
+        add_files(config, named->getTransform(OCIO::TRANSFORM_DIR_INVERSE), out);
+    }
+    return out;
+}
+
+extern "C" rl_code rl_ocio_files(const rl_ocio *ocio, rl_arena *arena, rl_ocio_names *out, rl_error *err)
+{
+    *out = rl_ocio_names{};
+    try {
+        file_names files = all_files(*ocio->config);
+        auto name = [&](size_t i) { return files[i].c_str(); };
+        return copy_names(files.size(), name, arena, out, err);
     } catch (...) {
         return rl_shim_caught(err);
     }

@@ -27,9 +27,9 @@ void rl_ocio_free(rl_ocio **ocio);
  * not ask, so that a config with one broken view can still be used for the others. */
 rl_code rl_ocio_validate(const rl_ocio *ocio, rl_error *err);
 
-/* Changes when the configuration or a file that it refers to does. Written to out, at most `size` bytes; ""
- * when OpenColorIO cannot say. */
-void rl_ocio_fingerprint(const rl_ocio *ocio, char *out, size_t size);
+/* A hash of the configuration's text as a name, the same on every machine. Written to out, at most `size`
+ * bytes. */
+rl_code rl_ocio_fingerprint(const rl_ocio *ocio, char *out, size_t size, rl_error *err);
 
 /* ---- names ------------------------------------------------------------------------------------------- */
 
@@ -48,6 +48,10 @@ typedef struct rl_ocio_names {
 
 rl_code rl_ocio_list_names(const rl_ocio *ocio, rl_ocio_list what, const char *of, rl_arena *arena,
                            rl_ocio_names *out, rl_error *err);
+
+/* Paths of the files that its transforms read, each once, in a fixed order; without those that are not there.
+ */
+rl_code rl_ocio_files(const rl_ocio *ocio, rl_arena *arena, rl_ocio_names *out, rl_error *err);
 
 /* The colour space that a name, alias or role stands for; NULL when there is none. Lives as long as the
  * configuration. */

@@ -15,6 +15,9 @@
 static const char *const kept_attributes[] = {"camera:*",
                                               "worldToCamera",
                                               "worldToNDC",
+                                              "cameraTransform",
+                                              "cameraFov",
+                                              "unreal/*",
                                               "timeCode",
                                               "framesPerSecond",
                                               "capDate",
@@ -174,6 +177,7 @@ static size_t add_attributes(const rl_sink_output *o, const rl_sink_frame *f, bo
     size_t n = 0;
     attrs[n++] = (rl_exr_attribute){"relit:version", {.type = RL_EXR_T_STRING, .text = RL_VERSION}};
     attrs[n++] = (rl_exr_attribute){"relit:pipeline", {.type = RL_EXR_T_STRING, .text = f->pipeline}};
+    attrs[n++] = (rl_exr_attribute){"relit:capture", {.type = RL_EXR_T_STRING, .text = f->capture}};
     if (o->space && colors)
         attrs[n++] = (rl_exr_attribute){"relit:colorspace", {.type = RL_EXR_T_STRING, .text = o->space}};
     if (o->primaries.known && colors) {

@@ -32,6 +32,7 @@ typedef struct rl_sink_frame {
     int source_part;
     double fps;           /* written where the source has no framesPerSecond; 0 = not known */
     const char *pipeline; /* relit:pipeline */
+    const char *capture;  /* relit:capture */
 } rl_sink_frame;
 
 typedef struct rl_sink_output {

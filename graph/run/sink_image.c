@@ -60,7 +60,9 @@ rl_code rl_sink_write_image(const char *path, const rl_sink_output *output, cons
                             output->spec->name);
     for (int i = 0; i < image->planes; i++)
         planes.plane[i] = image->pixels + (size_t)i * image->plane + first;
-    rl_image_note notes[] = {{"Software", "relit " RL_VERSION}, {"relit:pipeline", frame->pipeline}};
+    rl_image_note notes[] = {{"Software", "relit " RL_VERSION},
+                             {"relit:pipeline", frame->pipeline},
+                             {"relit:capture", frame->capture}};
     rl_image_options options = {.type = image_type(output->spec->type),
                                 .colorspace = output->space,
                                 .quality = output->spec->quality > 0 ? (int)output->spec->quality : 0,

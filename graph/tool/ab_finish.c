@@ -4,6 +4,7 @@
 #include <jansson.h>
 
 #include "graph/base/file.h"
+#include "graph/run/leftovers.h"
 #include "graph/tool/ab_json.h"
 #include "graph/tool/ab_junit.h"
 #include "graph/tool/ab_run.h"
@@ -125,6 +126,19 @@ static rl_code print_json(const finish *f)
                               : rl_report_result(r->tool->report, rl_str_text(&out), f->err);
     rl_str_free(&out);
     return code;
+}
+
+void rl_ab_clean(rl_ab_run *r)
+{
+    const char *const names[] = {metrics_name, junit_name, page_name}, *paths[4];
+    size_t n = 0;
+    for (size_t i = 0; i < 3; i++) {
+        paths[n] = rl_path_join(r->tool->arena, r->out, names[i]);
+        n += paths[n] != NULL;
+    }
+    if (r->sheet_path)
+        paths[n++] = r->sheet_path;
+    rl_leftovers_remove(paths, n);
 }
 
 /* What cannot be written does not keep the rest from being; the first error is told. */

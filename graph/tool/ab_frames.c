@@ -62,6 +62,7 @@ static rl_code compare(rl_ab_run *r, const rl_experiment_frame *f, rl_error *err
     if (!code)
         code = rl_ab_energy_add(&r->energy, &r->plan, f, err);
     r->frames += !code;
+    r->incomparable |= code == RL_E_DATA;
     return code;
 }
 

@@ -2,6 +2,7 @@
  * tree of the whole. */
 #include "graph/tool/ab_json.h"
 
+#include <inttypes.h>
 #include <jansson.h>
 #include <math.h>
 #include <stdlib.h>
@@ -82,8 +83,8 @@ static void variants_json(const rl_ab_report *r, rl_str *out)
             rl_ab_json_text(out, variant->settings[i].value);
             rl_str_add(out, "}");
         }
-        rl_str_printf(out, "], \"hash\": \"%016llx\"}",
-                      rl_experiment_session(r->experiment, v)->pipeline->hash);
+        rl_str_printf(out, "], \"hash\": \"%016" PRIx64 "\"}",
+                      rl_experiment_session(r->experiment, v)->content);
     }
     rl_str_add(out, "],\n \"parameters\": [");
     for (size_t i = 0; i < r->plan->n_parameters; i++) {

@@ -9,7 +9,7 @@
 typedef struct shown {
     rl_ocio_transform *transform;
     float gain;
-    char config[128];        /* fingerprint of the configuration */
+    uint64_t colors;         /* hash of the configuration */
     const rl_output *output; /* with its display, view and look */
 } shown;
 
@@ -33,7 +33,7 @@ static bool same(const rl_ab_page_display *a, const char *name, const shown *b)
 {
     const shown *x = a->ctx;
     return !strcmp(a->name, name) && same_text(x->output->look, b->output->look) && x->gain == b->gain &&
-           *b->config && !strcmp(x->config, b->config);
+           x->colors == b->colors;
 }
 
 static rl_code open_transform(const rl_session *session, const char *name, shown *s, rl_arena *arena,
@@ -65,7 +65,7 @@ static rl_code add_display(rl_arena *arena, const rl_session *session, rl_ab_pag
         return rl_fail_memory(err, sizeof *s);
     s->output = names->shown;
     s->gain = exp2f((float)names->shown->exposure);
-    rl_ocio_fingerprint(session->ocio, s->config, sizeof s->config);
+    s->colors = session->colors;
     for (size_t i = 0; i < out->n_displays; i++)
         if (same(&displays[i], names->space, s)) {
             *index = i;

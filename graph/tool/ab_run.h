@@ -27,7 +27,8 @@ typedef struct rl_ab_run {
     size_t n_ledgers;
     rl_ab_failure *failures;
     size_t n_failures, room_failures;
-    size_t frames; /* that were compared */
+    size_t frames;     /* that were compared */
+    bool incomparable; /* an image held NaN or infinity, or the reference has another size */
 } rl_ab_run;
 
 /* Hooks of the run, ctx is an rl_ab_run. A frame that cannot be measured is a frame that failed. */
@@ -35,6 +36,9 @@ void rl_ab_run_hooks(rl_ab_run *run, rl_experiment_hooks *out);
 
 /* ab_ledger.c: adds the ledger of energy of each capture's last frame to run->energy. */
 rl_code rl_ab_ledger(rl_ab_run *run, rl_error *err);
+
+/* Removes what a command that was killed left of the files that rl_ab_finish writes. */
+void rl_ab_clean(rl_ab_run *run);
 
 /* Writes metrics.json, junit.xml, report.html and the sheet, and prints the summary; *over is how many
  * thresholds are exceeded. */

@@ -6,6 +6,7 @@
 #include "graph/base/alloc.h"
 #include "graph/base/file.h"
 #include "graph/run/data_files.h"
+#include "graph/tool/cryptomatte.h"
 
 static bool is_yaml(const char *path)
 {
@@ -19,20 +20,20 @@ char *rl_capture_first(rl_arena *arena, const rl_manifest *m, int pattern)
     return rl_manifest_path(arena, m, &any, m->frames.n ? m->frames.numbers[0] : 1);
 }
 
-/* All channels of an open file; names live as long as the file. */
-static rl_code list_channels(rl_arena *arena, const rl_exr *file, rl_channel **out, size_t *n, rl_error *err)
+rl_code rl_capture_channels(rl_arena *arena, const rl_exr *file, rl_channel **out, size_t *n, rl_error *err)
 {
+    size_t room = 0;
     *n = 0;
     for (int p = 0; p < rl_exr_parts(file); p++)
-        *n += rl_exr_part_at(file, p)->n_channels;
-    *out = rl_arena_array(arena, *n + 1, sizeof **out);
+        room += rl_exr_part_at(file, p)->n_channels;
+    *out = rl_arena_array(arena, room + 1, sizeof **out);
     if (!*out)
-        return rl_fail_memory(err, *n * sizeof **out);
-    rl_channel *at = *out;
+        return rl_fail_memory(err, room * sizeof **out);
     for (int p = 0; p < rl_exr_parts(file); p++) {
         const rl_exr_part *part = rl_exr_part_at(file, p);
-        for (size_t i = 0; i < part->n_channels; i++)
-            *at++ = (rl_channel){part->name, part->channels[i].name};
+        for (size_t i = 0; i < part->n_channels && !part->deep; i++)
+            if (part->channels[i].x_sampling == 1 && part->channels[i].y_sampling == 1)
+                (*out)[(*n)++] = (rl_channel){part->name, part->channels[i].name};
     }
     return RL_OK;
 }
@@ -52,18 +53,20 @@ static rl_code find_bare(rl_arena *arena, const char *path, const char *presets,
     if (!code)
         code = rl_exr_open(first, 0, &file, err);
     if (!code)
-        code = list_channels(arena, file, &channels, &n, err);
+        code = rl_capture_channels(arena, file, &channels, &n, err);
     if (!code)
         code = rl_preset_find(arena, presets, channels, n, &match, err);
     if (code)
         goto done;
     out->preset = match.name;
     out->missing = !match.name ? "every layer" : match.missing_required ? match.missing : NULL;
-    if (match.name)
-        code = rl_manifest_bare(arena, path, match.name, presets, out->missing ? NULL : log, &out->manifest,
-                                err);
-    if (!code && match.name)
-        code = rl_manifest_bind(arena, out->manifest, 0, out->missing ? NULL : first, channels, n, err);
+    if (!out->missing)
+        code = rl_manifest_bare(arena, path, match.name, presets, log, &out->manifest, err);
+    if (!code && !out->missing)
+        code = rl_manifest_bind(arena, out->manifest, 0, first, channels, n, err);
+    if (!code && !out->missing)
+        rl_capture_name_ids(arena, out->manifest,
+                            &(rl_error){0}); /* names are no must: a run says what is wrong */
 done:
     rl_exr_close(&file);
     return code;
@@ -119,7 +122,8 @@ static rl_code read_ids(const rl_exr *file, const rl_layer *layer, uint32_t **ou
     *out = rl_calloc(*pixels, sizeof **out);
     if (!*out)
         return rl_fail_memory(err, *pixels * sizeof **out);
-    rl_exr_plane plane = {.channel = layer->channels[0], .ids = *out, .stride = (size_t)p->width};
+    rl_exr_plane plane = {
+        .channel = layer->channels[0], .ids = *out, .bits = layer->hashed, .stride = (size_t)p->width};
     return rl_exr_read(file, part, &plane, 1, NULL, NULL, err);
 }
 
@@ -133,6 +137,10 @@ rl_code rl_capture_ids(rl_arena *arena, const rl_manifest *m, size_t most, uint3
     *n = 0;
     if (!layer)
         return RL_OK;
+    if (!layer->n_channels && most) {
+        out[(*n)++] = layer->constant;
+        return RL_OK;
+    }
     char *path = rl_capture_first(arena, m, layer->pattern);
     rl_code code = path ? rl_exr_open(path, 0, &file, err) : rl_fail_memory(err, 1);
     if (!code)
@@ -143,6 +151,26 @@ rl_code rl_capture_ids(rl_arena *arena, const rl_manifest *m, size_t most, uint3
         if (ids[i] && (!i || ids[i] != ids[i - 1]))
             out[(*n)++] = ids[i];
     rl_free(ids);
+    rl_exr_close(&file);
+    return code;
+}
+
+rl_code rl_capture_name_ids(rl_arena *arena, rl_manifest *m, rl_error *err)
+{
+    enum { MOST = 256 };
+    const rl_layer *layer = rl_manifest_layer(m, "stencil");
+    uint32_t ids[MOST];
+    size_t n;
+    rl_exr *file = NULL;
+    if (!layer || !layer->hashed || m->n_stencil_names)
+        return RL_OK;
+    char *path = rl_capture_first(arena, m, layer->pattern);
+    rl_code code = path ? rl_capture_ids(arena, m, MOST, ids, &n, err) : rl_fail_memory(err, 1);
+    if (!code)
+        code = rl_exr_open(path, 0, &file, err);
+    if (!code)
+        code = rl_cryptomatte_names(arena, file, layer->channels[0], ids, n, &m->stencil_names,
+                                    &m->n_stencil_names, err);
     rl_exr_close(&file);
     return code;
 }

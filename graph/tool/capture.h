@@ -20,6 +20,14 @@ rl_code rl_capture_find(rl_arena *arena, const char *path, const rl_log *log, rl
 /* The file of a pattern of the manifest at its first frame; NULL when memory is out. */
 char *rl_capture_first(rl_arena *arena, const rl_manifest *m, int pattern);
 
+/* The channels of an open file that relit can read (no deep parts, no subsampling); their names live as long
+ * as the file. */
+rl_code rl_capture_channels(rl_arena *arena, const rl_exr *file, rl_channel **out, size_t *n, rl_error *err);
+
+/* Gives the ids of the first frame the names that the file has for them (Cryptomatte), when the manifest has
+ * none. */
+rl_code rl_capture_name_ids(rl_arena *arena, rl_manifest *m, rl_error *err);
+
 /* The stencil ids of the first frame, ascending, each once, at most `most`; 0 is left out, since it marks the
  * background as a rule. None when there is no stencil. */
 rl_code rl_capture_ids(rl_arena *arena, const rl_manifest *m, size_t most, uint32_t *out, size_t *n,

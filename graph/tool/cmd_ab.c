@@ -118,7 +118,11 @@ static rl_code open_all(rl_ab_run *r, rl_error *err)
         code = rl_outdir_make(r->out, err);
     if (!code)
         code = open_sheet(r, err);
-    return code ? code : open_page(r, err);
+    if (!code)
+        code = open_page(r, err);
+    if (!code)
+        rl_ab_clean(r);
+    return code;
 }
 
 static void close_all(rl_ab_run *r)
@@ -145,28 +149,40 @@ static double now_s(void)
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-/* The exit status when all is written: what failed comes before what differs. */
-static int status_of(rl_code run, rl_code finish, const rl_run_summary *summary, size_t over, int signal,
-                     rl_error *err)
+/* How the parts of the command ended. */
+typedef struct ending {
+    rl_code run, ledger, finish;
+    rl_run_summary summary;
+    size_t over;
+    int signal;
+} ending;
+
+/* The exit status when all is written: what is missing comes before what cannot be compared, that before what
+ * failed, that before what differs. */
+static int status_of(const rl_ab_run *r, const ending *e, rl_error *err)
 {
-    if (run == RL_E_CANCELLED) {
+    if (e->run == RL_E_CANCELLED || e->ledger == RL_E_CANCELLED) {
         *err = (rl_error){0};
-        return 128 + signal;
+        return 128 + e->signal;
     }
-    if (run)
-        return summary->frames ? RL_EXIT_FRAME : RL_EXIT_WRONG;
-    if (finish || summary->failed)
+    if (e->run)
+        return e->summary.frames ? RL_EXIT_FRAME : RL_EXIT_WRONG;
+    if (r->incomparable)
+        return RL_EXIT_WRONG;
+    if (e->finish || e->summary.failed)
         return RL_EXIT_FRAME;
-    return over ? RL_EXIT_OVER : RL_EXIT_DONE;
+    return e->over ? RL_EXIT_OVER : RL_EXIT_DONE;
 }
 
 /* The report without a ledger is still one. */
-static void add_ledger(rl_ab_run *r)
+static rl_code add_ledger(rl_ab_run *r)
 {
     rl_error err = {0};
-    if (rl_ab_ledger(r, &err))
+    rl_code code = rl_ab_ledger(r, &err);
+    if (code)
         rl_report(&r->tool->report->log, RL_WARNING, (rl_where){err.file, err.line, err.column},
                   "the report's ledger of energy is not whole: %s", err.text);
+    return code;
 }
 
 /* All frames, then the report of those that were compared, also when a signal ended the run. */
@@ -174,28 +190,27 @@ static int run_all(rl_ab_run *r, rl_error *err)
 {
     rl_reporter *report = r->tool->report;
     rl_experiment_hooks hooks;
-    rl_run_summary summary = {0};
     rl_error unwritten = {0};
-    size_t over = 0;
+    ending e = {0};
     double begin = now_s();
 
     rl_ab_run_hooks(r, &hooks);
     rl_signals_begin(fileno(report->err));
     rl_report_run_begin(report);
-    rl_code run = rl_experiment_run(r->experiment, &hooks, &summary, err), finish = RL_OK;
-    if (!run && r->frames && !r->tool->args.run.energy)
-        add_ledger(r);
-    int signal = rl_signals_caught();
+    e.run = rl_experiment_run(r->experiment, &hooks, &e.summary, err);
+    if (!e.run && r->frames && !r->tool->args.run.energy)
+        e.ledger = add_ledger(r);
+    e.signal = rl_signals_caught(); /* one that comes from here on finds all done but the writing */
+    if (!e.run || e.summary.frames || e.run == RL_E_CANCELLED) /* not: kernels that do not compile */
+        rl_report_run_end(report, &e.summary, e.run == RL_E_CANCELLED);
+    if (!e.run || r->frames)
+        e.finish = rl_ab_finish(r, now_s() - begin, &e.over, &unwritten);
+    if (!e.finish && r->trace)
+        e.finish = rl_trace_write(r->trace, r->tool->args.trace, &unwritten);
     rl_signals_end();
-    if (!run || summary.frames || run == RL_E_CANCELLED) /* not: kernels that do not compile */
-        rl_report_run_end(report, &summary, run == RL_E_CANCELLED);
-    if (!run || r->frames)
-        finish = rl_ab_finish(r, now_s() - begin, &over, &unwritten);
-    if (!finish && r->trace)
-        finish = rl_trace_write(r->trace, r->tool->args.trace, &unwritten);
-    if (finish)
+    if (e.finish)
         rl_report_error(report, &unwritten);
-    return status_of(run, finish, &summary, over, signal, err);
+    return status_of(r, &e, err);
 }
 
 int rl_cmd_ab(rl_tool *tool, rl_error *err)

@@ -5,6 +5,7 @@
 #include <strings.h>
 
 #include "graph/model/pass.h"
+#include "graph/run/camera_header.h"
 #include "graph/run/data_files.h"
 #include "graph/run/shim_ocio.h"
 #include "graph/tool/capture.h"
@@ -258,6 +259,10 @@ static void add_materials(rl_str *out, const rl_manifest *m, const uint32_t *ids
             add_ids(out, m, i);
             rl_str_printf(out, ", profile: %s}", g->profile);
         }
+        if (!is_name(name)) {
+            rl_str_add(out, g ? ", " : "    # ");
+            add_text(out, name);
+        }
         rl_str_add(out, "\n");
     }
     for (size_t i = 0; i < n_ids; i++)
@@ -319,6 +324,29 @@ static void add_graph(rl_str *out, const rl_manifest *m, const char *display, co
     rl_str_add(out, "}\n");
 }
 
+/* A bare file whose header does not say where the camera is: no pipeline would run on it. */
+static rl_code says_no_camera(rl_arena *arena, const rl_capture *capture, rl_error *err)
+{
+    double matrix[16];
+    rl_exr *file = NULL;
+    const rl_manifest *m = capture->manifest;
+    if (capture->file || m->camera.matrix_source != RL_SOURCE_HEADER)
+        return RL_OK;
+    char *path = rl_capture_first(arena, m, 0);
+    rl_code code = path ? rl_exr_open(path, 0, &file, err) : rl_fail_memory(err, 1);
+    bool found = false;
+    for (int p = 0; !code && p < rl_exr_parts(file); p++)
+        found = found || rl_camera_header_matrix(file, p, m->camera.forward_z, matrix);
+    if (!code && !found)
+        code = rl_fail_file(
+            err, RL_E_CONFIG, path,
+            "the file does not say where its camera is; `relit inspect %s` prints a capture.yaml to "
+            "begin with: save it, write camera.matrix and camera.fov_x there, and name it here",
+            path);
+    rl_exr_close(&file);
+    return code;
+}
+
 int rl_cmd_init(rl_tool *tool, rl_error *err)
 {
     const char *path = tool->args.operand, *display = NULL, *view = NULL;
@@ -329,10 +357,13 @@ int rl_cmd_init(rl_tool *tool, rl_error *err)
     rl_str text = {0};
     if (rl_capture_find(tool->arena, path, &tool->report->log, &capture, err))
         return RL_EXIT_WRONG;
+    if (!capture.missing && says_no_camera(tool->arena, &capture, err))
+        return RL_EXIT_WRONG;
     if (capture.missing) {
         rl_fail_file(
             err, RL_E_CONFIG, path,
-            "no preset finds all that relit needs (%s missing); write a capture.yaml, see `relit inspect %s`",
+            "no preset finds all that relit needs (%s missing); `relit inspect %s` prints a capture.yaml to "
+            "begin with: save it, complete it, and name it here",
             capture.missing, path);
         return RL_EXIT_WRONG;
     }

@@ -9,6 +9,7 @@
 
 #include "graph/base/file.h"
 #include "graph/tool/capture.h"
+#include "graph/tool/inspect_guess.h"
 #include "graph/tool/tool.h"
 
 /* ---- one file -------------------------------------------------------------------------------------------
@@ -60,7 +61,20 @@ static void print_attributes(const rl_exr *file, int part, rl_str *out)
     }
 }
 
-static rl_code print_file(const char *path, rl_str *out, rl_error *err)
+/* What files hold is a comment of the manifest that follows: so all that is printed can be saved as one. */
+static void add_comment(const rl_str *text, rl_str *out)
+{
+    const char *line = rl_str_text(text);
+    while (*line) {
+        size_t n = strcspn(line, "\n");
+        rl_str_add(out, n ? "# " : "#");
+        rl_str_addn(out, line, n);
+        rl_str_add(out, "\n");
+        line += n + (line[n] == '\n');
+    }
+}
+
+static rl_code list_file(const char *path, rl_str *out, rl_error *err)
 {
     rl_exr *file = NULL;
     rl_code code = rl_exr_open(path, 0, &file, err);
@@ -72,7 +86,7 @@ static rl_code print_file(const char *path, rl_str *out, rl_error *err)
         rl_str_printf(out, "  part %d", p);
         if (*part->name)
             rl_str_printf(out, " '%s'", part->name);
-        rl_str_printf(out, ": %s%s, %s compression\n", part->deep ? "deep " : "",
+        rl_str_printf(out, ": %s%s, %s compression\n", part->deep ? "deep (relit cannot read it) " : "",
                       part->tiled ? "tiled" : "scanline", rl_exr_compression_name(part->compression));
         if (part->tiled)
             rl_str_printf(out, "    tiles of %d x %d\n", part->tile_width, part->tile_height);
@@ -85,103 +99,28 @@ static rl_code print_file(const char *path, rl_str *out, rl_error *err)
     return RL_OK;
 }
 
-/* ---- how relit would read it ----------------------------------------------------------------------------
- */
-
-/* What no preset has found, to be filled in. */
-static void print_gaps(const rl_manifest *m, rl_str *out)
+static rl_code print_file(const char *path, rl_str *out, rl_error *err)
 {
-    static const char *const forms[] = {
-        [RL_LAYER_ALBEDO] = "{channels: [?, ?, ?], colorspace: lin_rec709}",
-        [RL_LAYER_NORMAL] = "{channels: [?, ?, ?], space: world, encoding: signed}",
-        [RL_LAYER_DEPTH] = "{channels: [?], kind: planar, empty: 1e10}",
-        [RL_LAYER_STENCIL] = "{channels: [?]}",
-    };
-    for (size_t i = 0; i < sizeof forms / sizeof *forms; i++)
-        if (rl_layer_types[i].required && !rl_manifest_layer(m, rl_layer_types[i].name))
-            rl_str_printf(out, "  #%s: %s    # %s\n", rl_layer_types[i].name, forms[i],
-                          rl_layer_types[i].help);
-}
-
-/* The manifest; behind `layers:` those that it lacks. */
-static void print_with_gaps(const rl_manifest *m, rl_str *out)
-{
-    static const char head[] = "\nlayers:\n";
     rl_str text = {0};
-    rl_manifest_print(m, &text);
-    const char *at = strstr(rl_str_text(&text), head);
-    size_t n = at ? (size_t)(at - rl_str_text(&text)) + sizeof head - 1 : text.length;
-    out->failed |= text.failed;
-    rl_str_addn(out, rl_str_text(&text), n);
-    print_gaps(m, out);
-    rl_str_add(out, rl_str_text(&text) + n);
+    rl_code code = list_file(path, &text, err);
+    if (!code && text.failed)
+        code = rl_fail_memory(err, text.room);
+    if (!code)
+        add_comment(&text, out);
     rl_str_free(&text);
-}
-
-static bool has_attribute(const rl_exr *file, const char *name)
-{
-    rl_exr_value v;
-    for (int p = 0; p < rl_exr_parts(file); p++)
-        if (rl_exr_attr(file, p, name, &v))
-            return true;
-    return false;
-}
-
-/* Says what a guess takes from the header that is not there, above the manifest. */
-static rl_code print_camera_gaps(rl_arena *arena, const rl_manifest *m, rl_str *out, rl_error *err)
-{
-    rl_exr *file = NULL;
-    const char *first = rl_capture_first(arena, m, 0);
-    rl_code code = first ? rl_exr_open(first, 0, &file, err) : rl_fail_memory(err, 1);
-    if (code)
-        return code;
-    if (m->camera.matrix_source == RL_SOURCE_HEADER && !has_attribute(file, "worldToCamera"))
-        rl_str_add(out,
-                   "# the file has no attribute worldToCamera: give camera.matrix, 16 numbers, rows listed, "
-                   "for column\n# vectors\n");
-    if (m->camera.fov_source == RL_SOURCE_HEADER && !has_attribute(file, "camera:fovx"))
-        rl_str_add(out, "# the file has no attribute camera:fovx: give camera.fov_x, in degrees, if its "
-                        "screenWindowWidth is not\n# the true one\n");
-    rl_exr_close(&file);
-    return RL_OK;
-}
-
-/* A guessed manifest is to be saved beside the files: their names in it are without a folder. */
-static rl_code print_guess(rl_arena *arena, const rl_capture *capture, rl_str *out, rl_error *err)
-{
-    rl_manifest m = *capture->manifest;
-    rl_pattern *patterns = rl_arena_array(arena, (size_t)m.n_patterns + 1, sizeof *patterns);
-    const char *folder = m.n_patterns ? rl_path_folder(arena, m.patterns[0].path) : ".";
-    if (!patterns || !folder)
-        return rl_fail_memory(err, sizeof *patterns);
-    for (int i = 0; i < m.n_patterns; i++) {
-        patterns[i] = m.patterns[i];
-        patterns[i].path = rl_path_name(m.patterns[i].path);
-    }
-    m.patterns = patterns;
-    if (capture->missing)
-        rl_str_printf(
-            out,
-            "# no preset finds all that relit needs: %s missing%s%s%s\n"
-            "# to start from: fill in the channels (part: NAME too, where files have parts), take the # "
-            "away,\n# check units and spaces, then save it as %s/capture.yaml\n",
-            capture->missing, capture->preset ? " in '" : "", capture->preset ? capture->preset : "",
-            capture->preset ? "', which fits best" : "", folder);
-    else
-        rl_str_printf(out,
-                      "# guessed by preset '%s': check units and spaces, then save it as %s/capture.yaml\n",
-                      capture->preset, folder);
-    rl_code code = print_camera_gaps(arena, capture->manifest, out, err);
-    print_with_gaps(&m, out);
     return code;
 }
 
-static rl_code print_mapping(rl_arena *arena, const rl_capture *capture, rl_str *out, rl_error *err)
+/* ---- how relit would read it ----------------------------------------------------------------------------
+ */
+
+static rl_code print_mapping(rl_tool *tool, const rl_capture *capture, rl_str *out, rl_error *err)
 {
     rl_str_add(out, "\n");
     if (!capture->file)
-        return print_guess(arena, capture, out, err);
+        return rl_inspect_guess(tool, capture, out, err);
     rl_str_printf(out, "# %s, as relit reads it\n", capture->file);
+    rl_inspect_look(tool, capture->manifest, out);
     rl_manifest_print(capture->manifest, out);
     return RL_OK;
 }
@@ -195,7 +134,7 @@ static rl_code print_capture(rl_tool *tool, const char *path, rl_str *out, rl_er
         char *first = rl_capture_first(tool->arena, capture.manifest, i);
         code = first ? print_file(first, out, err) : rl_fail_memory(err, strlen(path));
     }
-    return code ? code : print_mapping(tool->arena, &capture, out, err);
+    return code ? code : print_mapping(tool, &capture, out, err);
 }
 
 /* ---- a folder of files ----------------------------------------------------------------------------------
@@ -259,15 +198,48 @@ static rl_code list_patterns(rl_arena *arena, const char *folder, const char ***
     return RL_OK;
 }
 
+/* Whether a capture is torn into several sequences: none has all that relit needs. */
+static rl_code find_torn(rl_tool *tool, const char *const *patterns, size_t n, bool *torn, rl_error *err)
+{
+    rl_code code = RL_OK;
+    *torn = n > 1;
+    for (size_t i = 0; i < n && !code && *torn; i++) {
+        rl_capture capture;
+        code = rl_capture_find(tool->arena, patterns[i], NULL, &capture, err);
+        *torn = !code && capture.missing;
+    }
+    return code;
+}
+
+/* The first file of each sequence, and one manifest. */
+static rl_code print_torn(rl_tool *tool, const char *const *patterns, size_t n, rl_str *out, rl_error *err)
+{
+    rl_code code = RL_OK;
+    for (size_t i = 0; i < n && !code; i++) {
+        rl_capture capture;
+        code = rl_capture_find(tool->arena, patterns[i], NULL, &capture, err);
+        char *first = code ? NULL : rl_capture_first(tool->arena, capture.manifest, 0);
+        if (!code)
+            code = first ? print_file(first, out, err) : rl_fail_memory(err, 1);
+    }
+    rl_str_add(out, "\n");
+    return code ? code : rl_inspect_guess_files(tool, patterns, n, out, err);
+}
+
 static rl_code print_folder(rl_tool *tool, const char *folder, rl_str *out, rl_error *err)
 {
     const char **patterns;
     size_t n;
+    bool torn = false;
     rl_code code = list_patterns(tool->arena, folder, &patterns, &n, err);
     if (!code && !n)
         code = rl_fail_file(err, RL_E_IO, folder, "the folder holds no capture.yaml and no EXR file");
+    if (!code)
+        code = find_torn(tool, patterns, n, &torn, err);
+    if (!code && torn)
+        return print_torn(tool, patterns, n, out, err);
     for (size_t i = 0; !code && i < n; i++) {
-        rl_str_printf(out, "%s%s\n", i ? "\n" : "", patterns[i]);
+        rl_str_printf(out, "%s# %s\n", i ? "\n" : "", patterns[i]);
         code = print_capture(tool, patterns[i], out, err);
     }
     return code;
@@ -284,7 +256,7 @@ static rl_code print_one(rl_tool *tool, const char *path, rl_str *out, rl_error 
     rl_code code = print_file(path, out, err);
     if (!code)
         code = rl_capture_find(tool->arena, pattern, &tool->report->log, &capture, err);
-    return code ? code : print_mapping(tool->arena, &capture, out, err);
+    return code ? code : print_mapping(tool, &capture, out, err);
 }
 
 /* `relit inspect DIR > DIR/capture.yaml`: the shell has made the file, and nothing is in it yet. */

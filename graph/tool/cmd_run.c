@@ -39,7 +39,7 @@ static int status_of(rl_code code, const rl_run_summary *summary, int signal, rl
         return 128 + signal;
     }
     if (code)
-        return summary->frames || summary->lacking ? RL_EXIT_FRAME : RL_EXIT_WRONG;
+        return summary->frames || summary->lacking || summary->stuck ? RL_EXIT_FRAME : RL_EXIT_WRONG;
     return summary->failed ? RL_EXIT_FRAME : RL_EXIT_DONE;
 }
 
@@ -61,11 +61,11 @@ int rl_cmd_run(rl_tool *tool, rl_error *err)
     rl_report_run_begin(tool->report);
     rl_code code = rl_session_run(session, &hooks, &summary, err);
     int signal = rl_signals_caught();
-    rl_signals_end();
     rl_report_run_end(tool->report, &summary, code == RL_E_CANCELLED);
     status = status_of(code, &summary, signal, err);
     if (sinks.trace && rl_trace_write(sinks.trace, tool->args.trace, err) && status == RL_EXIT_DONE)
         status = RL_EXIT_FRAME;
+    rl_signals_end();
 done:
     rl_session_close(&session);
     rl_trace_free(&sinks.trace);

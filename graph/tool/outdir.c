@@ -20,10 +20,15 @@ rl_code rl_outdir_make(const char *path, rl_error *err)
     rl_code code = rl_folder_make(folder, err);
     if (code)
         return code;
+    int fd = open(folder, O_TMPFILE | O_WRONLY | O_CLOEXEC, 0600); /* nothing that could stay behind */
+    if (fd >= 0) {
+        close(fd);
+        return RL_OK;
+    }
     int n = snprintf(probe, sizeof probe, "%s/.relit-%ld.tmp", folder, (long)getpid());
     if (n < 0 || (size_t)n >= sizeof probe)
         return rl_fail_file(err, RL_E_IO, folder, "the path is too long");
-    int fd = open(probe, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+    fd = open(probe, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
     if (fd < 0)
         return rl_fail_file(err, RL_E_IO, folder, "no file can be made in this folder: %s", strerror(errno));
     close(fd);

@@ -2,12 +2,15 @@
 
 #include <inttypes.h>
 #include <pthread.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "graph/base/alloc.h"
 #include "graph/base/arena.h"
 #include "graph/base/file.h"
 #include "graph/base/text.h"
+#include "graph/run/leftovers.h"
+#include "graph/tool/ab_json.h"
 
 struct rl_trace {
     pthread_mutex_t mutex;
@@ -83,21 +86,6 @@ void rl_trace_add(rl_trace *t, const rl_run_span *span)
     pthread_mutex_unlock(&t->mutex);
 }
 
-/* JSON's escapes; bytes that are no ASCII become '?', since file names need not be UTF-8. */
-static void add_text(rl_str *s, const char *text)
-{
-    rl_str_add(s, "\"");
-    for (const unsigned char *c = (const unsigned char *)text; *c; c++) {
-        if (*c == '"' || *c == '\\')
-            rl_str_printf(s, "\\%c", *c);
-        else if (*c < 0x20)
-            rl_str_printf(s, "\\u%04x", *c);
-        else
-            rl_str_printf(s, "%c", *c < 0x80 ? *c : '?');
-    }
-    rl_str_add(s, "\"");
-}
-
 /* Microseconds with three decimals, without a detour over floating point. */
 static void add_time(rl_str *s, const char *key, uint64_t ns)
 {
@@ -115,32 +103,51 @@ static void add_lanes(rl_str *s)
             i + 1, names[i]);
 }
 
+/* By time, and what holds another before that, as viewers nest the events of a thread. Of two that began and
+ * ended together the one that was added later holds the other. */
+static int by_time(const void *a, const void *b)
+{
+    const rl_run_span *x = *(const rl_run_span *const *)a, *y = *(const rl_run_span *const *)b;
+    if (x->start != y->start)
+        return x->start < y->start ? -1 : 1;
+    if (x->end != y->end)
+        return x->end > y->end ? -1 : 1;
+    return x > y ? -1 : x < y;
+}
+
+static void add_span(rl_str *s, const rl_run_span *e, uint64_t zero)
+{
+    rl_str_printf(s, ",\n{\"ph\":\"X\",\"pid\":1,\"tid\":%d,\"cat\":", (int)e->lane + 1);
+    rl_ab_json_text(s, e->category);
+    rl_str_add(s, ",\"name\":");
+    rl_ab_json_text(s, e->name);
+    add_time(s, "ts", e->start - zero);
+    add_time(s, "dur", e->end > e->start ? e->end - e->start : 0);
+    rl_str_printf(s, ",\"args\":{\"frame\":%lld,\"capture\":", e->frame);
+    rl_ab_json_text(s, e->capture);
+    rl_str_add(s, "}}");
+}
+
 rl_code rl_trace_write(rl_trace *t, const char *path, rl_error *err)
 {
     rl_str s = {0};
-    uint64_t zero = UINT64_MAX;
+    rl_leftovers_remove(&path, 1);
     pthread_mutex_lock(&t->mutex);
-    for (size_t i = 0; i < t->n; i++)
-        zero = t->spans[i].start < zero ? t->spans[i].start : zero;
+    const rl_run_span **order = rl_calloc(t->n, sizeof *order);
+    for (size_t i = 0; order && i < t->n; i++)
+        order[i] = &t->spans[i];
+    if (order)
+        qsort(order, t->n, sizeof *order, by_time);
     rl_str_printf(&s, "{\"displayTimeUnit\":\"ms\",\"otherData\":{\"lost\":%zu},\"traceEvents\":[\n",
                   t->lost);
     add_lanes(&s);
-    for (size_t i = 0; i < t->n; i++) {
-        const rl_run_span *e = &t->spans[i];
-        rl_str_printf(&s, ",\n{\"ph\":\"X\",\"pid\":1,\"tid\":%d,\"cat\":", (int)e->lane + 1);
-        add_text(&s, e->category);
-        rl_str_add(&s, ",\"name\":");
-        add_text(&s, e->name);
-        add_time(&s, "ts", e->start - zero);
-        add_time(&s, "dur", e->end > e->start ? e->end - e->start : 0);
-        rl_str_printf(&s, ",\"args\":{\"frame\":%lld,\"capture\":", e->frame);
-        add_text(&s, e->capture);
-        rl_str_add(&s, "}}");
-    }
+    for (size_t i = 0; order && i < t->n; i++)
+        add_span(&s, order[i], order[0]->start);
     rl_str_add(&s, "\n]}\n");
     pthread_mutex_unlock(&t->mutex);
-    rl_code code =
-        s.failed ? rl_fail_memory(err, s.length) : rl_file_write(path, rl_str_text(&s), s.length, err);
+    rl_code code = s.failed || !order ? rl_fail_memory(err, s.length)
+                                      : rl_file_write(path, rl_str_text(&s), s.length, err);
+    rl_free(order);
     rl_str_free(&s);
     return code;
 }
