@@ -119,7 +119,7 @@ $(BUILD)/kernels.o $(BUILD)/page.o: %.o: %.c
 	$(Q)$(CC) $(CPPFLAGS) $(CFLAGS) -c $< -o $@
 
 # Loops over every sample of a frame: gcc vectorizes them from -O3 on, square roots when no errno is asked for.
-$(BUILD)/graph/run/ingest.o: OPT += -O3 -fno-math-errno -fno-trapping-math
+$(BUILD)/graph/run/ingest.o $(BUILD)/graph/run/exr_deflate.o: OPT += -O3 -fno-math-errno -fno-trapping-math
 
 # Sums over filter taps, the same; and powers of pixels, where errno and traps would keep sqrt and choices from it.
 $(BUILD)/graph/tool/metric_filter.o $(BUILD)/graph/tool/metric_flip.o: OPT += -O3

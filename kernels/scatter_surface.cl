@@ -149,6 +149,9 @@ static inline void scatter_area(global const float *depth, global const uint *st
                                 constant frame_t *f)
 {
     vector_t v = scatter_vector(f);
+    SCATTER_FETCH(depth + v.at + 2 * RL_W); /* of 48 streams the hardware loses track */
+    SCATTER_FETCH(stencil + v.at + 2 * RL_W);
+    SCATTER_FETCH(area + v.at + 2 * RL_W);
     floatv zx = SCATTER_AREA_SLOPE(depth, stencil, f, &v, 1, 0),
            zy = SCATTER_AREA_SLOPE(depth, stencil, f, &v, 0, 1);
     floatv x = rl_to_floatv((RL_LANES + v.sx) * 4 + v.px);

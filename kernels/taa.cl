@@ -32,8 +32,8 @@ static inline floatv snap(floatv d)
 /* The displacement of the pixel's own surface or, where another is in front of it in 3x3, of the closest (Karis 2014), so
  * that an edge moves as one. On one and the same surface a neighbour's displacement would be wrong by a little in the same
  * direction in every frame. */
-static inline void find_place(constant frame_t *f, global const float *depth, global const float *motion,
-                              global const uint *stencil, int x, int y, uintv id, place_t *p)
+COPIED void find_place(constant frame_t *f, global const float *depth, global const float *motion,
+                       global const uint *stencil, int x, int y, uintv id, place_t *p, const int inside)
 {
     float m[12];
     int moved = camera_change(f, m);
@@ -41,22 +41,23 @@ static inline void find_place(constant frame_t *f, global const float *depth, gl
     p->alone = (intv)-1;
     p->low = p->high = own;
     floatv own_dx = tap(motion, f, x, y), own_dy = tap(motion + f->plane, f, x, y), near_dx = own_dx, near_dy = own_dy;
+    RL_UNROLL
     for (int i = 0; i < 9; i++) {
         int nx = x + i % 3 - 1, ny = y + i / 3 - 1;
         if (i == 4)
             continue;
-        floatv z = far_if_empty(tap(depth, f, nx, ny));
+        floatv z = far_if_empty(tap_near(depth, f, nx, ny, inside));
         intv closer = z < best;
         best = fmin(best, z);
         last = fmax(last, z);
 #if HAS_stencil
-        intv mine = rl_load_id_edge(stencil, f, nx, ny) == id;
+        intv mine = rl_as_uintv(tap_near((global const float *)stencil, f, nx, ny, inside)) == id;
         p->alone &= mine;
         p->low = rl_select(p->low, fmin(p->low, z), mine);
         p->high = rl_select(p->high, fmax(p->high, z), mine);
 #endif
-        near_dx = rl_select(near_dx, tap(motion, f, nx, ny), closer);
-        near_dy = rl_select(near_dy, tap(motion + f->plane, f, nx, ny), closer);
+        near_dx = rl_select(near_dx, tap_near(motion, f, nx, ny, inside), closer);
+        near_dy = rl_select(near_dy, tap_near(motion + f->plane, f, nx, ny, inside), closer);
     }
     p->edge = last > best * (1.0f + DEPTH_TOLERANCE);
     p->alone &= ~p->edge;
@@ -181,10 +182,18 @@ kernel void taa(TAA_PORTS)
 #if HAS_stencil
         id = rl_load_id(stencil, at);
 #endif
-        find_place(f, depth, HAS_motion ? motion : moved, stencil, x, y, id, &place);
+        int inside = columns_inside(f, x);
+        if (inside)
+            find_place(f, depth, HAS_motion ? motion : moved, stencil, x, y, id, &place, 1);
+        else
+            find_place(f, depth, HAS_motion ? motion : moved, stencil, x, y, id, &place, 0);
         floatv dx = place.dx, dy = place.dy;
         intv still = (dx == 0.0f) & (dy == 0.0f);
-        colour_box(&box, f, color, own, x, y, rl_select(p->clip_gamma, STILL * p->clip_gamma, still));
+        floatv gamma = rl_select(p->clip_gamma, STILL * p->clip_gamma, still);
+        if (inside)
+            colour_box(&box, f, color, own, x, y, gamma, 1);
+        else
+            colour_box(&box, f, color, own, x, y, gamma, 0);
         floatv tx = dx - floor(dx), ty = dy - floor(dy);
         intv right = tx > 0.5f, below = ty > 0.5f;
         uintv key = displacement_key(f, x, y, dx, dy) & ~rl_as_uintv(in_set(p->exclude, id));

@@ -9,6 +9,26 @@ static inline floatv tap(global const float *p, constant frame_t *f, int x, int 
     return rl_load_edge(p, f, x, y);
 }
 
+#define COPIED static inline __attribute__((always_inline)) /* a copy for each value of a constant argument */
+
+/* Apart: the few vectors at the edges are not worth compiling it once a load. */
+static __attribute__((noinline)) floatv tap_apart(global const float *p, constant frame_t *f, int x, int y)
+{
+    return tap(p, f, x, y);
+}
+
+/* A tap where it is known whether the vector and its neighbours to the left and right lie in the image's columns: as a
+ * constant, so that no load asks again, which keeps what surrounds the loads in one piece. */
+COPIED floatv tap_near(global const float *p, constant frame_t *f, int x, int y, const int inside)
+{
+    return inside ? rl_load(p, rl_index(f, x, clamp(y, f->valid[1], f->valid[3] - 1))) : tap_apart(p, f, x, y);
+}
+
+static inline int columns_inside(constant frame_t *f, int x)
+{
+    return x > f->valid[0] && x + RL_W < f->valid[2];
+}
+
 static inline floatv far_if_empty(floatv z)
 {
     return rl_select(FAR, z, z > 0.0f);
@@ -39,8 +59,8 @@ typedef struct box_t {
 
 /* Mean and deviation of the 3x3 neighbourhood (Salvi 2016), around the pixel's own colour, which keeps the variance from
  * cancelling. The box is grown to contain that colour: a detail as small as a pixel would else be clipped away. */
-static inline void colour_box(box_t *b, constant frame_t *f, global const float *color, const floatv *own, int x, int y,
-                              floatv gamma)
+COPIED void colour_box(box_t *b, constant frame_t *f, global const float *color, const floatv *own, int x, int y,
+                              floatv gamma, const int inside)
 {
     floatv sum[3] = {0.0f, 0.0f, 0.0f}, squares[3] = {0.0f, 0.0f, 0.0f}, brightest = 0.0f, own_y[3];
     to_ycocg(own, own_y);
@@ -51,7 +71,7 @@ static inline void colour_box(box_t *b, constant frame_t *f, global const float 
         floatv d[3], v[3];
         RL_UNROLL
         for (int c = 0; c < 3; c++)
-            d[c] = tap(color + c * f->plane, f, x + i % 3 - 1, y + i / 3 - 1) - own[c];
+            d[c] = tap_near(color + c * f->plane, f, x + i % 3 - 1, y + i / 3 - 1, inside) - own[c];
         to_ycocg(d, v);
         brightest = fmax(brightest, v[0] + own_y[0]);
         RL_UNROLL
@@ -107,17 +127,19 @@ static inline floatv firefly_weight(const box_t *b, const floatv *rgb)
 static inline int camera_change(constant frame_t *f, float *m)
 {
     constant camera_t *a = &f->camera, *b = &f->previous;
-    int same = a->focal[0] == b->focal[0] && a->focal[1] == b->focal[1] && a->centre[0] == b->centre[0] &&
-               a->centre[1] == b->centre[1];
-    for (int i = 0; i < 12; i++)
-        same = same && a->to_view[i] == b->to_view[i];
+    int4 other = (vload4(0, a->focal) != vload4(0, b->focal)) | /* and the centres behind */
+                 (vload4(0, a->to_view) != vload4(0, b->to_view)) |
+                 (vload4(1, a->to_view) != vload4(1, b->to_view)) |
+                 (vload4(2, a->to_view) != vload4(2, b->to_view));
+    if (!(other.x | other.y | other.z | other.w))
+        return 0;
     for (int i = 0; i < 3; i++) {
         constant float *row = &b->to_view[4 * i];
         for (int j = 0; j < 3; j++)
             m[3 * i + j] = row[0] * a->to_world[j] + row[1] * a->to_world[4 + j] + row[2] * a->to_world[8 + j];
         m[9 + i] = row[0] * a->to_world[3] + row[1] * a->to_world[7] + row[2] * a->to_world[11] + row[3];
     }
-    return !same;
+    return 1;
 }
 
 /* Displacement of what is seen at (x, y) at depth z, by the cameras alone; `closer` is previous depth / z. */

@@ -245,10 +245,10 @@ static void shares_slots(void **state)
     assert_int_equal(plan->slot_planes[0], 3);
     assert_int_equal(rl_slot_bytes(plan, 0, &g), image);
 
-    /* the other layout has margins */
+    /* the other layout has margins, and an odd number of cache lines a sub-row */
     const rl_buffer phases = {.planes = 2, .layout = RL_PHASE4};
     assert_int_equal(rl_buffer_bytes(&phases, &g),
-                     ((size_t)2 * 16 * 3 * (32 + 2 * RL_MARGIN4) + 2 * RL_GUARD) * 4);
+                     ((size_t)2 * 16 * 3 * (32 + 2 * RL_MARGIN4 + 16) + 2 * RL_GUARD) * 4);
 
     /* history takes two, whatever is in flight */
     plan = PLAN(fake_nodes, "aa.color");
@@ -273,11 +273,11 @@ static void check_geometry(const rl_geometry *g)
     assert_true(g->origin_y + g->rows >= g->y + g->height && g->origin_y + g->rows < g->y + g->height + 4);
     assert_true(g->stride >= g->columns && g->stride % 32 == 0 && g->stride % 512 != 0);
     assert_int_equal(g->plane, g->stride * g->rows);
-    assert_int_equal(g->stride4, g->columns / 4 + 2 * RL_MARGIN4);
+    assert_true(g->stride4 >= g->columns / 4 + 2 * RL_MARGIN4 && g->stride4 % 32 == 16);
     assert_int_equal(g->plane4, 16 * (g->rows / 4) * g->stride4);
     /* the last sample of the last sub-image, with its margin, is the last of the plane */
-    assert_int_equal((15 * (g->rows / 4) + g->rows / 4 - 1) * g->stride4 + 2 * RL_MARGIN4 + g->columns / 4,
-                     g->plane4);
+    assert_true((15 * (g->rows / 4) + g->rows / 4 - 1) * g->stride4 + 2 * RL_MARGIN4 + g->columns / 4 <=
+                g->plane4);
 }
 
 static void measures_windows(void **state)

@@ -79,6 +79,14 @@ void *rl_aligned(size_t bytes)
     return counted(advised(aligned_alloc(RL_ALIGN, whole ? whole : RL_ALIGN), whole));
 }
 
+void *rl_aligned_zeroed(size_t bytes, void **block)
+{
+    *block = bytes > SIZE_MAX - RL_ALIGN ? NULL : rl_calloc(1, bytes + RL_ALIGN);
+    if (!*block)
+        return NULL;
+    return advised((char *)*block + (RL_ALIGN - (uintptr_t)*block % RL_ALIGN) % RL_ALIGN, bytes);
+}
+
 char *rl_strdup(const char *text)
 {
     size_t n = strlen(text) + 1;

@@ -19,6 +19,9 @@ void *rl_malloc(size_t bytes);
 void *rl_calloc(size_t count, size_t size); /* zeroed; checks count·size for overflow */
 void *rl_realloc(void *p, size_t bytes);    /* not for aligned memory */
 void *rl_aligned(size_t bytes);             /* aligned to RL_ALIGN, not zeroed */
+/* Aligned and zeroed, without touching pages that the system gives zeroed. It lies in *block, which is what
+ * rl_free takes. */
+void *rl_aligned_zeroed(size_t bytes, void **block);
 char *rl_strdup(const char *text);
 void rl_free(void *p); /* NULL is safe */
 

@@ -10,6 +10,9 @@
  * rows and planes then evicts itself. Such strides get two cache lines more. */
 #define ALIASING_STRIDE 512
 #define STRIDE_PAD      32
+/* As do neighbours in RL_PHASE4: the sub-rows and planes that a filter's taps read at a time. An odd number
+ * of cache lines from one sub-row to the next puts them into all sets. */
+#define LINE 16
 /* Kernels index the planes of an rgb image with an int; rl_plan_fits looks at images with more planes. */
 #define PLANES_AT_LEAST 3
 
@@ -28,7 +31,8 @@ rl_code rl_geometry_make(int x, int y, int width, int height, rl_geometry *out, 
     const long long columns = -floor_to(-((long long)x + width - origin_x), COLUMN_UNIT);
     const long long rows = -floor_to(-((long long)y + height - origin_y), ROW_UNIT);
     const long long stride = columns + (columns % ALIASING_STRIDE == 0 ? STRIDE_PAD : 0);
-    const long long stride4 = columns / 4 + 2 * RL_MARGIN4;
+    const long long least4 = columns / 4 + 2 * RL_MARGIN4;
+    const long long stride4 = least4 + (least4 / LINE % 2 == 0 ? LINE : 0);
     const long long plane = stride * rows, plane4 = 16 * (rows / 4) * stride4;
     const long long most = (INT_MAX - 2 * RL_GUARD) / PLANES_AT_LEAST;
     if (plane > most || plane4 > most || origin_x < INT_MIN || origin_y < INT_MIN ||

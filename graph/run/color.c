@@ -118,22 +118,35 @@ static rl_code give_tables(const rl_pass_input *in, rl_arena *arena, rl_tables *
     return RL_OK;
 }
 
+static void add_pieces(rl_str *s, const char *const *pieces)
+{
+    for (; *pieces; pieces++)
+        rl_str_add(s, *pieces);
+}
+
+/* With COLOR_VECTORS, every other item does its neighbour's vector too; columns are a multiple of 64. */
 static void write_program(rl_str *s, const rl_color_text *t)
 {
-    for (const char *const *piece = rl_color_prelude; *piece; piece++)
-        rl_str_add(s, *piece);
+    if (!t->table_n)
+        rl_str_add(s, rl_color_wide);
+    add_pieces(s, rl_color_prelude);
+    if (t->table_n)
+        add_pieces(s, rl_color_tables);
     rl_str_printf(
         s,
+        "#ifndef COLOR_VECTORS\n#define COLOR_VECTORS 1\n#define color_load rl_load\n#define color_store "
+        "rl_store\n#endif\n"
         "\nkernel void color_apply(global const float *in, global float *out, constant params_t *p, "
         "constant frame_t *f,\n                        constant material_t *materials%s)\n{\n",
         t->table_n ? ", constant float *tables" : "");
-    rl_str_add(s, "    int i = rl_index(f, RL_W * (int)get_global_id(0), (int)get_global_id(1));\n"
+    rl_str_add(s, "    if (get_global_id(0) % COLOR_VECTORS)\n        return;\n"
+                  "    int i = rl_index(f, RL_W * (int)get_global_id(0), (int)get_global_id(1));\n"
                   "    floatv gain = rl_c_exp2(K(p->exposure));\n"
-                  "    floatv r = gain * rl_load(in, i), g = gain * rl_load(in, i + f->plane);\n"
-                  "    floatv b = gain * rl_load(in, i + 2 * f->plane);\n");
+                  "    floatv r = gain * color_load(in, i), g = gain * color_load(in, i + f->plane);\n"
+                  "    floatv b = gain * color_load(in, i + 2 * f->plane);\n");
     rl_str_addn(s, rl_str_text(&t->body), t->body.length);
-    rl_str_add(s, "    rl_store(r, out, i);\n    rl_store(g, out, i + f->plane);\n"
-                  "    rl_store(b, out, i + 2 * f->plane);\n}\n");
+    rl_str_add(s, "    color_store(r, out, i);\n    color_store(g, out, i + f->plane);\n"
+                  "    color_store(b, out, i + 2 * f->plane);\n}\n");
     s->failed = s->failed || t->body.failed;
 }
 

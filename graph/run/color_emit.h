@@ -14,8 +14,13 @@ typedef struct rl_color_text {
     bool no_memory;
 } rl_color_text;
 
-/* The vector functions that bodies call; in front of every program. Pieces of text, NULL behind the last. */
-extern const char *const rl_color_prelude[];
+/* The vector functions that bodies call, in front of every program, and behind them those that read tables.
+ * Pieces of text, NULL behind the last. */
+extern const char *const rl_color_prelude[], *const rl_color_tables[];
+
+/* In front of them, in programs without tables: makes floatv two vectors where that is faster, and defines
+ * COLOR_VECTORS, color_load and color_store then. */
+extern const char *const rl_color_wide;
 
 /* Appends one operation; false when there is no generator for it (then nothing was appended). */
 bool rl_color_emit(rl_color_text *t, const rl_op *op);

@@ -55,28 +55,55 @@ static double end_slope(const rl_op_spline *s)
  * right and of min(x - knot, 0)² for every knot to its left. With √|d| inside of the square that is three
  * operations a knot, no comparison and no table. The parabola is the middle piece's: the sums then cancel
  * least. */
-static void emit_smooth(rl_color_text *t, const rl_op_spline *s, char c)
+static void emit_smooth_start(rl_color_text *t, const rl_op_spline *s, char c)
 {
     size_t mid = (s->n - 2) / 2;
-    double first = s->knots[0], last = s->knots[s->n - 1];
-    rl_str_printf(&t->body, "        x = min(max(%c, %s), %s);\n", c, RL_LIT(first), RL_LIT(last));
-    rl_str_printf(&t->body, "        u = x - %s;\n        y = fma(fma(u, K(%s), K(%s)), u, K(%s));\n",
-                  RL_LIT(s->knots[mid]), RL_LIT(s->a[mid]), RL_LIT(s->b[mid]), RL_LIT(s->c[mid]));
-    for (size_t i = 1; i + 1 < s->n; i++) {
-        double change = i > mid ? (double)s->a[i] - s->a[i - 1] : (double)s->a[i - 1] - s->a[i];
-        double root = sqrt(fabs(change));
-        if (change != 0)
-            rl_str_printf(&t->body, "        u = %s(fma(x, K(%s), K(%s)), 0.0f), y = fma(%su, u, y);\n",
-                          i > mid ? "max" : "min", RL_LIT(root), RL_LIT(-root * s->knots[i]),
-                          change < 0 ? "-" : "");
-    }
+    rl_str_printf(&t->body, "        x%c = min(max(%c, %s), %s);\n", c, c, RL_LIT(s->knots[0]),
+                  RL_LIT(s->knots[s->n - 1]));
+    rl_str_printf(&t->body,
+                  "        u%c = x%c - %s;\n        y%c = fma(fma(u%c, K(%s), K(%s)), u%c, K(%s));\n", c, c,
+                  RL_LIT(s->knots[mid]), c, c, RL_LIT(s->a[mid]), RL_LIT(s->b[mid]), c, RL_LIT(s->c[mid]));
+}
+
+static void emit_smooth_knot(rl_color_text *t, const rl_op_spline *s, size_t i, char c)
+{
+    size_t mid = (s->n - 2) / 2;
+    double change = i > mid ? (double)s->a[i] - s->a[i - 1] : (double)s->a[i - 1] - s->a[i];
+    double root = sqrt(fabs(change));
+    if (change != 0)
+        rl_str_printf(&t->body,
+                      "        u%c = %s(fma(x%c, K(%s), K(%s)), 0.0f), y%c = fma(%su%c, u%c, y%c);\n", c,
+                      i > mid ? "max" : "min", c, RL_LIT(root), RL_LIT(-root * s->knots[i]), c,
+                      change < 0 ? "-" : "", c, c, c);
+}
+
+static void emit_smooth_end(rl_color_text *t, const rl_op_spline *s, char c)
+{
     if (s->b[0] != 0)
-        rl_str_printf(&t->body, "        y = fma(min(%c - %s, 0.0f), K(%s), y);\n", c, RL_LIT(first),
-                      RL_LIT(s->b[0]));
+        rl_str_printf(&t->body, "        y%c = fma(min(%c - %s, 0.0f), K(%s), y%c);\n", c, c,
+                      RL_LIT(s->knots[0]), RL_LIT(s->b[0]), c);
     if (fabs(end_slope(s)) > 1e-7)
-        rl_str_printf(&t->body, "        y = fma(max(%c - %s, 0.0f), K(%s), y);\n", c, RL_LIT(last),
-                      RL_LIT(end_slope(s)));
-    rl_str_printf(&t->body, "        %c = y;\n", c);
+        rl_str_printf(&t->body, "        y%c = fma(max(%c - %s, 0.0f), K(%s), y%c);\n", c, c,
+                      RL_LIT(s->knots[s->n - 1]), RL_LIT(end_slope(s)), c);
+    rl_str_printf(&t->body, "        %c = y%c;\n", c, c);
+}
+
+/* Knot by knot of all channels: each sum waits for itself, the three do not wait for each other. */
+static void emit_smooth(rl_color_text *t, const rl_op_spline *const *s)
+{
+    size_t most = 0;
+    for (int i = 0; i < 3; i++)
+        most = s[i]->n > most ? s[i]->n : most;
+    for (int i = 0; i < 3; i++)
+        if (s[i]->n)
+            emit_smooth_start(t, s[i], channel[i]);
+    for (size_t k = 1; k + 1 < most; k++)
+        for (int i = 0; i < 3; i++)
+            if (k + 1 < s[i]->n)
+                emit_smooth_knot(t, s[i], k, channel[i]);
+    for (int i = 0; i < 3; i++)
+        if (s[i]->n)
+            emit_smooth_end(t, s[i], channel[i]);
 }
 
 /* For pieces that do not meet smoothly, and for the inverse: a chain of selections finds the piece. `at` are
@@ -121,28 +148,37 @@ static void emit_inverse(rl_color_text *t, const rl_op_spline *s, char c)
                   RL_LIT(above), RL_LIT(s->knots[s->n - 1]), c, RL_LIT(high));
 }
 
-static void emit_spline(rl_color_text *t, const rl_op_spline *s, char c, bool inverse)
+/* One spline a channel; those without knots change nothing. */
+static void emit_splines(rl_color_text *t, const rl_op_spline *const *s, bool inverse)
 {
-    if (s->n == 0)
+    bool smooth = !inverse;
+    for (int i = 0; i < 3; i++)
+        smooth = smooth && (s[i]->n == 0 || is_smooth(s[i]));
+    if (smooth) {
+        emit_smooth(t, s);
         return;
-    if (inverse)
-        emit_inverse(t, s, c);
-    else if (is_smooth(s))
-        emit_smooth(t, s, c);
-    else
-        emit_pieces(t, s, c);
+    }
+    for (int i = 0; i < 3; i++) {
+        if (s[i]->n && inverse)
+            emit_inverse(t, s[i], channel[i]);
+        else if (s[i]->n)
+            emit_pieces(t, s[i], channel[i]);
+    }
 }
 
 bool rl_color_emit_curves(rl_color_text *t, const rl_op *op)
 {
-    const rl_op_spline *own = op->u.curves.spline, *master = own + 3;
-    rl_str_add(&t->body, "        floatv x, y, u, v, k, ka, kb, kc;\n        intv m;\n");
+    const rl_op_spline *own[3], *master[3];
+    for (int i = 0; i < 3; i++) {
+        own[i] = &op->u.curves.spline[i];
+        master[i] = &op->u.curves.spline[3];
+    }
+    rl_str_add(&t->body, "        floatv xr, yr, ur, xg, yg, ug, xb, yb, ub, y, u, v, k, ka, kb, kc;\n"
+                         "        intv m;\n");
     if (op->u.curves.lin)
         emit_lin_to_log(t);
-    for (int i = 0; i < 3; i++) {
-        emit_spline(t, op->inverse ? master : own + i, channel[i], op->inverse);
-        emit_spline(t, op->inverse ? own + i : master, channel[i], op->inverse);
-    }
+    emit_splines(t, op->inverse ? master : own, op->inverse);
+    emit_splines(t, op->inverse ? own : master, op->inverse);
     if (op->u.curves.lin)
         emit_log_to_lin(t);
     return true;

@@ -161,7 +161,10 @@ const char *const rl_color_prelude[] = {
     "    *b = fma(rl_c_ramp(2.0f - fabs(h - 4.0f)), range, low);\n"
     "}\n"
     "\n",
-    "/* ---- tables ---- */\n"
+    NULL,
+};
+
+const char *const rl_color_tables[] = {
     "#if RL_W == 16\n"
     "#define GATHER(t, i)                                                                                   "
     "\\\n"

@@ -21,12 +21,12 @@ static rl_code create_buffer(rl_memory *m, rl_error *err)
     const rl_device *d = m->device;
     cl_int status = CL_OUT_OF_RESOURCES;
     if (d->info.host_memory) {
-        m->host = rl_aligned(m->bytes);
-        if (!m->host)
+        void *host = rl_aligned_zeroed(m->bytes, &m->block);
+        if (!host)
             return rl_fail_memory(err, m->bytes);
         if (!rl_cl_injected())
-            m->mem = clCreateBuffer(d->context, CL_MEM_READ_WRITE | CL_MEM_USE_HOST_PTR, m->bytes, m->host,
-                                    &status);
+            m->mem =
+                clCreateBuffer(d->context, CL_MEM_READ_WRITE | CL_MEM_USE_HOST_PTR, m->bytes, host, &status);
     } else if (!rl_cl_injected()) {
         m->mem =
             clCreateBuffer(d->context, CL_MEM_READ_WRITE | CL_MEM_ALLOC_HOST_PTR, m->bytes, NULL, &status);
@@ -51,7 +51,7 @@ rl_code rl_memory_new(rl_device *device, size_t bytes, size_t guard, rl_memory *
         if (!m->seen)
             code = rl_cl_fail(err, status, "a part of a buffer cannot be made");
     }
-    if (!code)
+    if (!code && !m->block)
         code = fill_zero(m, err);
     if (code)
         rl_memory_free(&m);
@@ -69,7 +69,7 @@ void rl_memory_free(rl_memory **memory)
         clReleaseMemObject(m->seen);
     if (m->mem)
         clReleaseMemObject(m->mem);
-    rl_free(m->host);
+    rl_free(m->block);
     rl_free(m);
 }
 

@@ -34,7 +34,7 @@ struct rl_memory {
     cl_mem mem;
     cl_mem seen; /* what kernels get: mem, or the part of it behind the guard */
     size_t bytes;
-    void *host; /* host-memory devices: ours */
+    void *block; /* host-memory devices: ours, where the buffer lies */
     void *mapped;
     int maps; /* how often it is mapped */
 };

@@ -106,8 +106,8 @@ typedef struct rl_exr_plane {
 } rl_exr_plane;
 
 /* Called on the thread that has just unpacked rows y0…y1-1 (relative to the data window) of all planes, so
- * that they can be converted while they are in the cache. Calls run in parallel and in any order; each row
- * comes once. */
+ * that they can be converted while they are in the cache: of scanlines one row at a time, of tiles a row of
+ * them. Calls run in parallel and in any order; each row comes once. */
 typedef struct rl_exr_rows {
     void (*done)(void *ctx, int part, int y0, int y1);
     void *ctx;
@@ -169,7 +169,8 @@ void rl_exr_attr_print(const rl_exr *file, int part, size_t i, rl_str *out);
 
 /* ---- writing ---- */
 
-/* A channel to be written. `floats` for half and float, `ids` for uint. */
+/* A channel to be written. `floats` for half and float, `ids` for uint; half and float with `ids` alone is a
+ * mask: 1 where the id is not 0. */
 typedef struct rl_exr_source {
     const char *name; /* with its layer: "diffuse.R" */
     rl_exr_pixel type;

@@ -35,8 +35,8 @@ typedef struct rl_exr_fix {
     float inf_value;
 } rl_exr_fix;
 
-/* The loops that run over every sample. There is a portable set and, where the processor has it, a vector
- * one; both give the same bits. `n` counts samples (span kernels: bytes of one half). Nothing needs to be
+/* The loops that run over every sample. There is a portable set and, where the processor has them, vector
+ * ones; all give the same bits. `n` counts samples (span kernels: bytes of one half). Nothing needs to be
  * aligned.
  *
  * ZIP stores the even bytes of a chunk, then the odd ones, and of all that byte for byte the difference to
@@ -59,6 +59,10 @@ typedef struct rl_exr_kernels {
 extern const rl_exr_kernels rl_exr_kernels_portable;
 /* The fastest set for this processor. */
 const rl_exr_kernels *rl_exr_kernels_best(void);
+/* The sets that run on it, slowest first: i = 0, 1, …; NULL behind the last. */
+const rl_exr_kernels *rl_exr_kernels_at(int i);
+/* Puts loops of exr_pixel_wide.c in the place of others; false where the processor has none of them. */
+bool rl_exr_kernels_widen(rl_exr_kernels *set);
 
 /* Rare conversions, portable only. They return n, or the index of the first value that does not fit. */
 size_t rl_exr_uint_to_float(const void *in, float *out, size_t n);

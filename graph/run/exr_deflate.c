@@ -34,12 +34,29 @@ static size_t sample_bytes(rl_exr_pixel type)
     return type == RL_EXR_HALF ? 2 : 4;
 }
 
+static void pack_mask(const uint32_t *ids, rl_exr_pixel type, size_t width, uint8_t *out)
+{
+    const uint16_t one = 0x3c00;
+    for (size_t x = 0; type == RL_EXR_HALF && x < width; x++) {
+        uint16_t half = ids[x] ? one : 0;
+        memcpy(out + 2 * x, &half, sizeof half);
+    }
+    for (size_t x = 0; type == RL_EXR_FLOAT && x < width; x++) {
+        float f = ids[x] ? 1.0f : 0.0f;
+        memcpy(out + 4 * x, &f, sizeof f);
+    }
+}
+
 /* Row `y` (relative to the data window) of a channel as the file has it; returns how many values were
  * clamped. */
 static size_t pack_row(const rl_exr_deflater *de, const rl_exr_source *source, int y, size_t width,
                        uint8_t *out)
 {
     size_t from = (size_t)y * source->stride;
+    if (source->type != RL_EXR_UINT && !source->floats) {
+        pack_mask(source->ids + from, source->type, width, out);
+        return 0;
+    }
     if (source->type == RL_EXR_HALF)
         return de->kernels->float_to_half(source->floats + from, out, width);
     memcpy(out, source->type == RL_EXR_UINT ? (const void *)(source->ids + from) : (source->floats + from),
@@ -86,7 +103,10 @@ static size_t pack_coded(const rl_exr_deflater *de, const exr_chunk_info_t *chun
  * another one, which does not; so the first 16 go ahead, and are flushed. That takes 8 bytes a chunk. */
 #define AHEAD 16
 
-static size_t compress_isal(rl_exr_deflater *de, uint32_t size)
+/* A zlib stream around ISA-L's: its own checksum takes ten times as long as libdeflate's. */
+enum { ZLIB_HEADER = 2, ZLIB_TRAILER = 4 };
+
+static size_t deflate_isal(rl_exr_deflater *de, uint32_t size, uint8_t *out, uint32_t room)
 {
     struct isal_zstream *s = de->stream;
     uint32_t ahead = size < AHEAD ? size : AHEAD;
@@ -94,13 +114,13 @@ static size_t compress_isal(rl_exr_deflater *de, uint32_t size)
     memset(de->level_buffer, 0, ISAL_DEF_LVL1_REQ);
     memset(de->coded + size, 0, LOOK_AHEAD);
     isal_deflate_init(s);
-    s->gzip_flag = IGZIP_ZLIB;
+    s->gzip_flag = IGZIP_DEFLATE;
     s->level = 1;
     s->level_buf = de->level_buffer;
     s->level_buf_size = ISAL_DEF_LVL1_DEFAULT;
     s->next_in = de->coded;
-    s->next_out = de->packed;
-    s->avail_out = size - 1;
+    s->next_out = out;
+    s->avail_out = room;
     s->avail_in = ahead;
     s->flush = SYNC_FLUSH;
     if (isal_deflate(s) != COMP_OK || s->avail_in > 0)
@@ -109,6 +129,21 @@ static size_t compress_isal(rl_exr_deflater *de, uint32_t size)
     s->flush = NO_FLUSH;
     s->end_of_stream = 1;
     return isal_deflate(s) == COMP_OK && s->internal_state.state == ZSTATE_END ? s->total_out : 0;
+}
+
+static size_t compress_isal(rl_exr_deflater *de, uint32_t size)
+{
+    if (size <= ZLIB_HEADER + ZLIB_TRAILER + 1)
+        return 0;
+    size_t n = deflate_isal(de, size, de->packed + ZLIB_HEADER, size - 1 - ZLIB_HEADER - ZLIB_TRAILER);
+    if (n == 0)
+        return 0;
+    uint32_t sum = libdeflate_adler32(1, de->coded, size);
+    uint8_t *end = de->packed + ZLIB_HEADER + n;
+    memcpy(de->packed, "\x78\x01", ZLIB_HEADER);
+    for (int i = 0; i < ZLIB_TRAILER; i++)
+        end[i] = (uint8_t)(sum >> (24 - 8 * i));
+    return ZLIB_HEADER + n + ZLIB_TRAILER;
 }
 
 /* Compresses `size` bytes of de->coded into de->packed; 0 when the result would not be smaller. */

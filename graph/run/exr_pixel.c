@@ -3,6 +3,7 @@
 #include "graph/run/exr_core.h"
 
 #include <math.h>
+#include <pthread.h>
 #include <string.h>
 
 #if defined(__x86_64__)
@@ -342,12 +343,35 @@ static const rl_exr_kernels kernels_avx2 = {
 
 #endif
 
-const rl_exr_kernels *rl_exr_kernels_best(void)
+static rl_exr_kernels kernels_wide; /* AVX-512 where that is faster */
+static int n_sets = 1;
+static pthread_once_t once = PTHREAD_ONCE_INIT;
+
+static void find_sets(void)
 {
 #ifdef RL_X86
     unsigned a, b, c, d; /* F16C by hand: not every compiler's __builtin_cpu_supports knows it */
-    if (__builtin_cpu_supports("avx2") && __get_cpuid(1, &a, &b, &c, &d) && (c & bit_F16C))
-        return &kernels_avx2;
+    if (!__builtin_cpu_supports("avx2") || !__get_cpuid(1, &a, &b, &c, &d) || !(c & bit_F16C))
+        return;
+    kernels_wide = kernels_avx2;
+    n_sets = rl_exr_kernels_widen(&kernels_wide) ? 3 : 2;
+#endif
+}
+
+const rl_exr_kernels *rl_exr_kernels_at(int i)
+{
+    pthread_once(&once, find_sets);
+    if (i < 0 || i >= n_sets)
+        return NULL;
+#ifdef RL_X86
+    if (i > 0)
+        return i == 1 ? &kernels_avx2 : &kernels_wide;
 #endif
     return &rl_exr_kernels_portable;
+}
+
+const rl_exr_kernels *rl_exr_kernels_best(void)
+{
+    pthread_once(&once, find_sets);
+    return rl_exr_kernels_at(n_sets - 1);
 }

@@ -110,6 +110,13 @@ static size_t row_bytes(const exr_coding_channel_info_t *c, int y)
     return (size_t)c->width * (size_t)c->bytes_per_element;
 }
 
+/* Rows y0…y1-1 are complete. */
+static void rows_done(const job *j, int y0, int y1)
+{
+    if (j->rows && j->rows->done)
+        j->rows->done(j->rows->ctx, j->part, y0, y1);
+}
+
 /* Walks the rows of a chunk and stores the wanted channels. `data` holds `size` bytes in the order row,
  * channel, sample; `coded`: behind ZIP's predictor, even and odd bytes apart. */
 static rl_code unpack(worker *w, const exr_coding_channel_info_t *channels, const uint8_t *data, size_t size,
@@ -140,6 +147,8 @@ static rl_code unpack(worker *w, const exr_coding_channel_info_t *channels, cons
                     return code;
             }
         }
+        if (!j->tiles_across)
+            rows_done(j, at->y + y, at->y + y + 1);
     }
     return RL_OK;
 }
@@ -178,8 +187,8 @@ static rl_code read_band(worker *w, int band, rl_error *err)
             return rl_fail_file(err, RL_E_FORMAT, file->path, "a chunk lies outside of the data window");
         code = read_chunk(w, &chunk, &at, err);
     }
-    if (!code && j->rows && j->rows->done)
-        j->rows->done(j->rows->ctx, j->part, at.y, at.y + at.height);
+    if (!code && j->tiles_across)
+        rows_done(j, at.y, at.y + at.height);
     return code;
 }
 

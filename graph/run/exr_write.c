@@ -74,7 +74,7 @@ static rl_code check_image(const char *path, const rl_exr_image *im, rl_error *e
     size_t width = (size_t)(d->x1 - d->x0) + 1;
     for (size_t c = 0; c < im->n_channels; c++) {
         const rl_exr_source *source = &im->channels[c];
-        bool has = source->type == RL_EXR_UINT ? source->ids != NULL : source->floats != NULL;
+        bool has = source->ids || (source->type != RL_EXR_UINT && source->floats);
         if (!has || source->stride < width || (unsigned)source->type > RL_EXR_FLOAT)
             return rl_fail_file(err, RL_E_USAGE, path, "channel '%s' has no proper pixels", source->name);
         if (!source->name[0] || strlen(source->name) > 255)

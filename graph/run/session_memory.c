@@ -26,8 +26,8 @@ static int output_channels(const rl_sequence *q, size_t output)
     return n;
 }
 
-/* Coverage as a plane; then chunks of an EXR (coded, packed, and what waits to be written, a thread), or all
- * samples of an image in another format. Outputs are written one after the other. */
+/* Chunks of an EXR (coded, packed, and what waits to be written, a thread), or all samples of an image in
+ * another format. Outputs are written one after the other. */
 static size_t encode_bytes(const rl_session *s, const rl_sequence *q)
 {
     static const size_t type_bytes[] = {
@@ -45,7 +45,7 @@ static size_t encode_bytes(const rl_session *s, const rl_sequence *q)
         size_t one = strcmp(rl_path_extension(o->file), ".exr") ? whole : chunks;
         most = one > most ? one : most;
     }
-    return add(most, pixels * sizeof(float));
+    return most;
 }
 
 void rl_session_need(const rl_session *s, const rl_sequence *q, int in_flight, rl_memory_need *out)

@@ -72,34 +72,6 @@ static rl_code crop_region(const rl_sink_frame *f, region *r, rl_error *err)
     return RL_OK;
 }
 
-/* Coverage: 1 where there is a material. */
-typedef struct coverage_job {
-    const rl_sink_frame *f;
-    const region *r;
-    float *out;
-} coverage_job;
-
-static void coverage_row(void *ctx, int y)
-{
-    const coverage_job *j = ctx;
-    const uint32_t *in = j->f->stencil + (size_t)(j->r->y0 + y) * j->f->stencil_stride + j->r->x0;
-    float *out = j->out + (size_t)y * (size_t)j->r->width;
-    for (int x = 0; x < j->r->width; x++)
-        out[x] = in[x] ? 1.0f : 0.0f;
-}
-
-static rl_code make_coverage(const rl_sink_frame *f, const region *r, rl_pool *pool, float **out,
-                             rl_error *err)
-{
-    size_t bytes = (size_t)r->width * (size_t)r->height * sizeof **out;
-    *out = rl_aligned(bytes);
-    if (!*out)
-        return rl_fail_memory(err, bytes);
-    coverage_job job = {f, r, *out};
-    rl_pool_for(pool, r->height, coverage_row, &job);
-    return RL_OK;
-}
-
 /* Channel letters of DESIGN 3: R G B (A), X Y Z, V, ID. A plane a light has the light's name. */
 static const char *const *letters(rl_format format, int *n)
 {
@@ -172,14 +144,16 @@ static void add_image(channel_list *list, const rl_sink_image *image, rl_exr_pix
     }
 }
 
-/* An rgb image carries coverage as A: its own layer's, or the file's when several layers share it. */
-static void add_coverage(channel_list *list, const rl_sink_image *images, size_t n, const float *coverage,
-                         int width, rl_exr_pixel type)
+/* An rgb image carries coverage as A, 1 where there is a material: its own layer's, or the file's when
+ * several layers share it. */
+static void add_coverage(channel_list *list, const rl_sink_image *images, size_t n, const rl_sink_frame *f,
+                         const region *r, rl_exr_pixel type)
 {
+    const uint32_t *ids = f->stencil + (size_t)r->y0 * f->stencil_stride + r->x0;
     for (size_t i = 0; i < n; i++)
         if (images[i].format == RL_RGB)
             add_channel(list, images[i].name, "A",
-                        (rl_exr_source){.type = type, .floats = coverage, .stride = (size_t)width});
+                        (rl_exr_source){.type = type, .ids = ids, .stride = f->stencil_stride});
 }
 
 /* 24 is 24/1, 23.976… of broadcast 24000/1001, anything else thousandths. */
@@ -220,15 +194,15 @@ static size_t add_attributes(const rl_sink_output *o, const rl_sink_frame *f, bo
 }
 
 static rl_code write_exr(const char *path, const rl_sink_output *o, const rl_sink_image *images, size_t n,
-                         const rl_sink_frame *f, const region *r, const float *coverage, rl_pool *pool,
-                         uint64_t *clamped, rl_error *err)
+                         const rl_sink_frame *f, const region *r, rl_pool *pool, uint64_t *clamped,
+                         rl_error *err)
 {
     rl_exr_pixel type = o->spec->type == RL_FLOAT ? RL_EXR_FLOAT : RL_EXR_HALF;
     channel_list list = {0};
     list_begin(&list, images, n);
     for (size_t i = 0; i < n; i++)
         add_image(&list, &images[i], type, r);
-    add_coverage(&list, images, n, coverage, r->width, type);
+    add_coverage(&list, images, n, f, r, type);
     uint64_t beyond = 0;
     bool colors = false;
     for (size_t i = 0; i < n; i++)
@@ -268,20 +242,16 @@ rl_code rl_sink_write(const char *path, const rl_sink_output *output, const rl_s
                       rl_error *err)
 {
     region r;
-    float *coverage = NULL;
     rl_arena arena = {0};
     const char *folder = rl_path_folder(&arena, path);
     rl_code code = folder ? crop_region(frame, &r, err) : rl_fail_memory(err, strlen(path));
     if (!code)
         code = rl_folder_make(folder, err);
-    if (!code)
-        code = make_coverage(frame, &r, pool, &coverage, err);
     if (!code && !strcasecmp(rl_path_extension(path), ".exr"))
-        code = write_exr(path, output, images, n_images, frame, &r, coverage, pool, clamped, err);
+        code = write_exr(path, output, images, n_images, frame, &r, pool, clamped, err);
     else if (!code)
         code = rl_sink_write_image(path, output, &images[0], (size_t)r.y0 * images[0].stride + (size_t)r.x0,
                                    r.width, r.height, frame, pool, clamped, err);
-    rl_free(coverage);
     rl_arena_free(&arena);
     return code;
 }
