@@ -19,32 +19,34 @@ static inline int gain_stride(constant frame_t *f)
     return (f->rows >> 2) * f->stride4;
 }
 
-/* How much deeper the tangent plane is (dx, dy) pixels away, metres. */
-static inline floatv plane_dz(const group_t *g, int dx, int dy)
-{
-    return scatter_plane_dz(g->z, g->plane.x * (float)dx + g->plane.y * (float)dy);
-}
-
 /* gain[c] by n taps of the group. What counts as black is on the tangent plane here, so it makes no gain; where the
  * surface has turned away it has no weight. */
 static inline void sum_shape(const inputs_t *in, const group_t *g, global const float *taps, int n,
                              floatv gain[3])
 {
     floatv planar[3] = {0.0f, 0.0f, 0.0f}, more[3] = {0.0f, 0.0f, 0.0f};
-    floatv per_own = 1.0f / rl_vload(0, in->area + g->v.at);
+    floatv per_own = 1.0f / rl_vload(0, in->area + g->v.at), per_z = 1.0f / g->z;
+    floatv slope_x = g->plane.x * per_z, slope_y = g->plane.y * per_z;
     taps_t block;
     taps = pattern_of(g, taps, n);
     for (int first = 0; first < n; first += TAP_BLOCK) {
         int last = min(TAP_BLOCK, n - first);
         place_taps(in, g, taps, tap_stride(n), first, last, &block);
+        for (int i = 0; i < AHEAD; i++)
+            fetch_shape(in, block.at[i]);
         for (int i = 0; i < last; i++) {
             int a = block.at[i];
+            fetch_shape(in, block.at[i + AHEAD]);
             intv id = rl_as_intv(rl_vload(0, in->stencil + a)), same = id == g->material;
-            floatv other = rl_vload(0, in->depth + a), flat = plane_dz(g, block.dx[i], block.dy[i]), p[3], w[3];
-            intv away = scatter_turned_away(in, &g->v, block.dx[i], block.dy[i], id, other, g->z + flat);
+            floatv other = rl_vload(0, in->depth + a), p[3], w[3];
+            floatv f = fma(slope_x, (floatv)(float)block.dx[i], slope_y * (float)block.dy[i]);
+            floatv k = scatter_plane_scale(f), deeper = f * k;
+            intv away = 0;
+            if (scatter_any(~same))
+                away = scatter_turned_away(in, &g->v, block.dx[i], block.dy[i], id, other,
+                                           fma(g->z, deeper, g->z));
             intv curved = same | (away & ~g->keep);
-            weigh_tap(g, &block, i, flat * g->inv_d, block.weight[i] * scatter_plane_area(g->z, flat),
-                      curved | g->keep, p);
+            weigh_tap(g, &block, i, g->z_u * deeper, block.weight[i] * (k * k * k), curved | g->keep, p);
             weigh_tap(g, &block, i, (other - g->z) * g->inv_d,
                       block.weight[i] * rl_vload(0, in->area + a) * per_own, same, w);
             for (int c = 0; c < 3; c++) {

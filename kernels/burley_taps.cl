@@ -106,13 +106,18 @@ static inline void place_taps(const inputs_t *in, const group_t *g, global const
     rl_vstore((intv)g->v.at, 0, to->at + i);
 }
 
-/* The planes of a tap that comes soon. */
-static inline void fetch_tap(const inputs_t *in, int at)
+/* The planes of a tap that comes soon: those of the surface, and all. */
+static inline void fetch_shape(const inputs_t *in, int at)
 {
-    int plane = in->f->plane4;
     scatter_fetch((global const float *)in->stencil + at);
     scatter_fetch(in->depth + at);
     AREA(scatter_fetch(in->area + at);)
+}
+
+static inline void fetch_tap(const inputs_t *in, int at)
+{
+    int plane = in->f->plane4;
+    fetch_shape(in, at);
     scatter_fetch(in->diffuse + at);
     scatter_fetch(in->diffuse + plane + at);
     scatter_fetch(in->diffuse + 2 * plane + at);

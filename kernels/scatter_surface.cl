@@ -61,11 +61,12 @@ static inline floatv scatter_far2(floatv z, floatv rx, float ry, float u, float 
     return fma(a, a, fma(b, b, dz * dz));
 }
 
-/* How much deeper than z a plane is where, by its slope at z, it would be `flat` deeper: 1/z is linear on screen. Near
- * its horizon and beyond, where no light comes from, at most 50 z. */
-static inline floatv scatter_plane_dz(floatv z, floatv flat)
+/* How many times as deep as here a plane is where, were depth linear on screen, it would be 1 + f times as deep: 1/z is
+ * what is linear. The area that a pixel sees of it grows with the cube. Near the plane's horizon and beyond, where no
+ * light comes from, 50. */
+static inline floatv scatter_plane_scale(floatv f)
 {
-    return flat / fmax(1.0f - flat / z, 0.02f);
+    return 1.0f / fmax(1.0f - f, 0.02f);
 }
 
 /* ---- weighting: surface ------------------------------------------------------------------------------- */
@@ -97,13 +98,6 @@ static inline plane_t scatter_plane(const inputs_t *in, const vector_t *v)
     p.x = scatter_mean_slope(in->depth, in->stencil, in->f, v, 1, 0);
     p.y = scatter_mean_slope(in->depth, in->stencil, in->f, v, 0, 1);
     return p;
-}
-
-/* What a pixel sees of the plane there beside what it sees of it here: its distance from the camera's plane cubed. */
-static inline floatv scatter_plane_area(floatv z, floatv dz)
-{
-    floatv k = (z + dz) / z;
-    return k * k * k;
 }
 
 /* The cosine between the surface and the ray, from the area that the pixel sees. */

@@ -121,8 +121,7 @@ static inline sample_t sample_of(const lanes_t *l, int dx, int dy)
         s.same &= rl_insidev(f, x, y);
     float u = (float)dx / f->camera.focal[0], v = (float)dy / -f->camera.focal[1];
     floatv dz = scatter_keep(rl_load(l->in.depth, s.at) - l->z, s.same);
-    floatv a = fma(dz, l->rx + u, l->z * u), b = fma(dz, (floatv)(l->ry + v), l->z * v);
-    s.far2 = fma(a, a, fma(b, b, dz * dz));
+    s.far2 = scatter_far2(l->z, l->rx, l->ry, u, v, dz);
     s.area = 1.0f;
     AREA(s.area = rl_select(s.area, rl_load(l->in.area, s.at) * l->per_area, s.same);)
     return s;

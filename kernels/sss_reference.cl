@@ -123,12 +123,13 @@ static inline void reject(const inputs_t *in, const centre_t *at, int dx, int dy
 static inline void gather_plane(const inputs_t *in, const centre_t *at, int dx, int dy, intv near, intv same,
                                 intv id, floatv other, const floatv w[3], sums_t *s)
 {
-    floatv flat = scatter_plane_dz(at->z, at->plane.x * (float)dx + at->plane.y * (float)dy);
+    floatv f = (at->plane.x * (float)dx + at->plane.y * (float)dy) / at->z, k = scatter_plane_scale(f);
+    floatv flat = at->z * f * k;
     intv away = near & scatter_turned_away(in, &at->v, dx, dy, id, other, at->z + flat);
     intv counts = same | away | (near & at->keep);
     if (!scatter_any(counts))
         return;
-    floatv p[3], stands = rl_vload(0, in->area + at->v.at) * scatter_plane_area(at->z, flat);
+    floatv p[3], stands = rl_vload(0, in->area + at->v.at) * k * k * k;
     weigh(at, dx, dy, flat, p);
     for (int c = 0; c < 3; c++) {
         p[c] = scatter_keep(p[c] * stands, counts);
@@ -144,7 +145,8 @@ static inline void gather(const inputs_t *in, const centre_t *at, int dx, int dy
     floatv rise = 0.0f; /* how much deeper the disk is */
     float x = (float)dx * at->px, y = (float)dy * at->py;
 #if P_orientation == ORIENTATION_TANGENT
-    rise = scatter_plane_dz(at->z, at->z * (at->tilt_x * x + at->tilt_y * y));
+    rise = at->tilt_x * x + at->tilt_y * y;
+    rise *= at->z * scatter_plane_scale(rise);
 #endif
     int i = scatter_at(in->f, &at->v, dx, dy);
     intv near = mine & (far2_of(at, x, y, rise) <= at->reach * at->reach);

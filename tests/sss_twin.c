@@ -155,10 +155,10 @@ double twin_distance_to(const twin_scene *s, int x, int y, double u, double v, d
     return sqrt(pow(to[0] - from[0], 2) + pow(to[1] - from[1], 2) + dz * dz);
 }
 
-/* How much deeper than z a plane is that would be by `flat`, were depth linear on screen. */
-static double along_plane(double z, double flat)
+/* How many times as deep a plane is that would be 1 + f times as deep, were depth linear on screen. */
+static double plane_scale(double f)
 {
-    return flat / fmax(1 - flat / z, 0.02);
+    return 1 / fmax(1 - f, 0.02);
 }
 
 /* ---- weighting: surface ---- */
@@ -172,10 +172,10 @@ tangent_t twin_tangent_of(const twin_scene *s, int x, int y)
 /* How much deeper it is (dx, dy) pixels away, and the area that is seen of it there beside the area here. */
 double twin_plane_dz(const twin_scene *s, const tangent_t *t, int x, int y, int dx, int dy, double *area)
 {
-    double z = s->depth[twin_at(s, x, y)];
-    double dz = along_plane(z, t->x * (float)dx + t->y * (float)dy);
-    *area = pow((z + dz) / z, 3);
-    return dz;
+    double z = s->depth[twin_at(s, x, y)], f = ((double)t->x * dx + (double)t->y * dy) / z,
+           k = plane_scale(f);
+    *area = k * k * k;
+    return z * f * k;
 }
 
 /* Between the surface and the ray. */
@@ -278,7 +278,8 @@ void twin_reference(const twin_scene *s, int x, int y, double filtered[3])
     for (int dy = -ry; dy <= ry; dy++)
         for (int dx = -rx; dx <= rx; dx++) {
             double u = dx / (double)c->focal[0], v = dy / (double)c->focal[1];
-            double rise = along_plane(z, z * ((double)t[0] * u + (double)t[1] * v));
+            double rise = (double)t[0] * u + (double)t[1] * v;
+            rise *= z * plane_scale(rise);
             if (twin_distance_to(s, x, y, u, v, rise) <= reach)
                 add_pixel(s, x, y, dx, dy, d, &total);
         }
