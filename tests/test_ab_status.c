@@ -20,27 +20,7 @@
 #include "tests/small_capture.h"
 #include "tests/tool_run.h"
 
-static char *folder, *pipe_file, *out;
 static char program[PATH_MAX]; /* relit, beside the tests */
-
-static int setup(void **state)
-{
-    (void)state;
-    folder = folder_new();
-    small_capture_write(folder);
-    pipe_file = path_in(folder, "pipe.yaml");
-    out = path_in(folder, "out");
-    return 0;
-}
-
-static int teardown(void **state)
-{
-    (void)state;
-    free(pipe_file);
-    free(out);
-    folder_remove(folder);
-    return 0;
-}
 
 #define RUN(...) tool_run((const char *const[]){__VA_ARGS__, NULL})
 
@@ -54,7 +34,7 @@ static void expect(const tool_result *r, int status, const char *says)
 static size_t frames_compared(void)
 {
     size_t size, n = 0;
-    char *path = path_in(out, "metrics.json"), *text = file_read(path, &size);
+    char *path = path_in(small_out, "metrics.json"), *text = file_read(path, &size);
     json_t *root = json_loads(text, 0, NULL), *row;
     assert_non_null(root);
     bool seen[SMALL_FRAMES + 1] = {false};
@@ -91,15 +71,16 @@ static void test_nan(void **state)
         "write, type: rgb}}, params: {gain: {type: float, value: 0, range: [0, 2]}}, in: {in: aa.color}}\n"
         "outputs: {beauty: {image: bad.out}, preview: {image: bad.out}}\n";
     (void)state;
-    char *path = path_in(folder, "nan.yaml");
-    file_write(folder, "nan.yaml", pipeline, strlen(pipeline));
-    file_write(folder, "spoil.cl", kernel, strlen(kernel));
-    tool_result r = RUN("ab", path, "--vary", "graph.bad.gain=0,1", "--out", out, "--seeds", "1", "--quiet");
+    char *path = path_in(small_folder, "nan.yaml");
+    file_write(small_folder, "nan.yaml", pipeline, strlen(pipeline));
+    file_write(small_folder, "spoil.cl", kernel, strlen(kernel));
+    tool_result r =
+        RUN("ab", path, "--vary", "graph.bad.gain=0,1", "--out", small_out, "--seeds", "1", "--quiet");
     expect(&r, 2, "frame 2: bad.out (linear) holds NaN");
     assert_int_equal(frames_compared(), SMALL_FRAMES - 1);
-    assert_int_equal(folder_files(out), 2 * SMALL_OUTPUTS * SMALL_FRAMES + 3);
+    assert_int_equal(folder_files(small_out), 2 * SMALL_OUTPUTS * SMALL_FRAMES + 3);
     tool_result_free(&r);
-    r = RUN("ab", path, "--vary", "graph.bad.gain=0,1", "--vary", "graph.sss.taps=4,21", "--out", out,
+    r = RUN("ab", path, "--vary", "graph.bad.gain=0,1", "--vary", "graph.sss.taps=4,21", "--out", small_out,
             "--seeds", "1", "--quiet", "--fail-over", "max=0");
     expect(&r, 2, "holds NaN");
     tool_result_free(&r);
@@ -111,15 +92,15 @@ static void test_nan(void **state)
 static void test_reference(void **state)
 {
     (void)state;
-    char *golden = path_in(folder, "golden"), *second = path_in(golden, "s.0002.exr");
-    tool_result r = RUN("run", pipe_file, "--out", golden, "--quiet");
+    char *golden = path_in(small_folder, "golden"), *second = path_in(golden, "s.0002.exr");
+    tool_result r = RUN("run", small_pipe, "--out", golden, "--quiet");
     expect(&r, 0, "");
     tool_result_free(&r);
-    char *cropped = path_in(folder, "cropped"), *small = path_in(cropped, "s.0002.exr");
-    r = RUN("run", pipe_file, "--out", cropped, "--quiet", "--crop", "0,0,8,8");
+    char *cropped = path_in(small_folder, "cropped"), *small = path_in(cropped, "s.0002.exr");
+    r = RUN("run", small_pipe, "--out", cropped, "--quiet", "--crop", "0,0,8,8");
     tool_result_free(&r);
     assert_int_equal(rename(small, second), 0);
-    r = RUN("ab", pipe_file, "--against", golden, "--out", out, "--seeds", "1", "--quiet");
+    r = RUN("ab", small_pipe, "--against", golden, "--out", small_out, "--seeds", "1", "--quiet");
     expect(&r, 2, "s.0002.exr");
     assert_int_equal(frames_compared(), SMALL_FRAMES - 1);
     tool_result_free(&r);
@@ -135,7 +116,7 @@ static void test_signal(void **state)
 {
     (void)state;
     int results[2], status;
-    char c, *said = path_in(folder, "said");
+    char c, *said = path_in(small_folder, "said");
     assert_int_equal(pipe(results), 0);
     fflush(NULL);
     pid_t pid = fork();
@@ -144,8 +125,8 @@ static void test_signal(void **state)
         dup2(results[1], 1);
         close(results[0]);
         if (freopen(said, "w", stderr))
-            execl(program, "relit", "ab", pipe_file, "--vary", "graph.sss.taps=21,4", "--seeds", "1", "--out",
-                  out, "--json", (char *)NULL);
+            execl(program, "relit", "ab", small_pipe, "--vary", "graph.sss.taps=21,4", "--seeds", "1",
+                  "--out", small_out, "--json", (char *)NULL);
         _exit(127);
     }
     close(results[1]);
@@ -170,7 +151,7 @@ static void test_signal(void **state)
 static void test_late_signal(void **state)
 {
     (void)state;
-    char *late = path_in(folder, "late"), *metrics = path_in(late, "metrics.json"),
+    char *late = path_in(small_folder, "late"), *metrics = path_in(late, "metrics.json"),
          *report = path_in(late, "report.html");
     int status;
     fflush(NULL);
@@ -178,8 +159,8 @@ static void test_late_signal(void **state)
     assert_true(pid >= 0);
     if (!pid) {
         if (freopen("/dev/null", "w", stdout) && freopen("/dev/null", "w", stderr))
-            execl(program, "relit", "ab", pipe_file, "--vary", "graph.sss.taps=21,4", "--seeds", "1", "--out",
-                  late, (char *)NULL);
+            execl(program, "relit", "ab", small_pipe, "--vary", "graph.sss.taps=21,4", "--seeds", "1",
+                  "--out", late, (char *)NULL);
         _exit(127);
     }
     while (access(metrics, F_OK) && !waitpid(pid, &status, WNOHANG)) /* the page comes behind it */
@@ -212,18 +193,18 @@ static void test_leftovers(void **state)
     if (!dead)
         _exit(0);
     assert_int_equal(waitpid(dead, NULL, 0), dead);
-    char *variant = path_in(out, "taps_4"), *trace = path_in(folder, "t.json");
+    char *variant = path_in(small_out, "taps_4"), *trace = path_in(small_folder, "t.json");
     tool_result r =
-        RUN("ab", pipe_file, "--vary", "graph.sss.taps=4,21", "--out", out, "--seeds", "1", "--quiet");
+        RUN("ab", small_pipe, "--vary", "graph.sss.taps=4,21", "--out", small_out, "--seeds", "1", "--quiet");
     expect(&r, 0, "");
     tool_result_free(&r);
-    char *gone[] = {leave(out, "report.html", dead),    leave(out, "metrics.json", dead),
-                    leave(out, "junit.xml", dead),      leave(out, "sheet.png", dead),
-                    leave(variant, "s.0003.exr", dead), leave(variant, "s.0001.png", dead),
-                    leave(folder, "t.json", dead)},
-         *stay[] = {leave(out, "notes.txt", dead), leave(variant, "s.0004.exr", dead),
+    char *gone[] = {leave(small_out, "report.html", dead), leave(small_out, "metrics.json", dead),
+                    leave(small_out, "junit.xml", dead),   leave(small_out, "sheet.png", dead),
+                    leave(variant, "s.0003.exr", dead),    leave(variant, "s.0001.png", dead),
+                    leave(small_folder, "t.json", dead)},
+         *stay[] = {leave(small_out, "notes.txt", dead), leave(variant, "s.0004.exr", dead),
                     leave(variant, "s.0002.exr", (long)getppid())};
-    r = RUN("ab", pipe_file, "--vary", "graph.sss.taps=4,21", "--out", out, "--seeds", "1", "--quiet",
+    r = RUN("ab", small_pipe, "--vary", "graph.sss.taps=4,21", "--out", small_out, "--seeds", "1", "--quiet",
             "--sheet", "--trace", trace);
     expect(&r, 0, "");
     tool_result_free(&r);
@@ -246,14 +227,14 @@ static void test_leftovers(void **state)
 static void test_killed(void **state)
 {
     (void)state;
-    char *plain = path_in(folder, "plain"), *killed = path_in(folder, "killed");
+    char *plain = path_in(small_folder, "plain"), *killed = path_in(small_folder, "killed");
     for (int i = 0; i < 8; i++) {
         fflush(NULL);
         pid_t pid = fork();
         assert_true(pid >= 0);
         if (!pid) {
             if (freopen("/dev/null", "w", stdout) && freopen("/dev/null", "w", stderr))
-                execl(program, "relit", "ab", pipe_file, "--vary", "graph.sss.taps=21,4", "--seeds", "1",
+                execl(program, "relit", "ab", small_pipe, "--vary", "graph.sss.taps=21,4", "--seeds", "1",
                       "--out", i ? killed : plain, (char *)NULL);
             _exit(127);
         }
@@ -300,5 +281,5 @@ int main(int argc, char **argv)
     char *self = realpath(argv[0], NULL);
     snprintf(program, sizeof program, "%s/../relit", self ? dirname(self) : "build/tests");
     free(self);
-    return cmocka_run_group_tests(tests, setup, teardown);
+    return cmocka_run_group_tests(tests, small_setup, small_teardown);
 }
