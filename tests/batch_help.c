@@ -62,6 +62,14 @@ batch_place batch_enter(int frames)
     return p;
 }
 
+batch_place batch_enter_plain(int frames)
+{
+    batch_place p = batch_enter(frames);
+    tool_result r = BATCH(&p, "plain", 0, "--quiet");
+    tool_result_free(&r);
+    return p;
+}
+
 void batch_leave(batch_place *p)
 {
     free(p->capture);

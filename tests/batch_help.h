@@ -15,6 +15,8 @@ typedef struct batch_place {
 
 /* Call from the repository's folder. */
 batch_place batch_enter(int frames);
+/* The same, with an undisturbed run in `plain`. */
+batch_place batch_enter_plain(int frames);
 void batch_leave(batch_place *place);
 
 /* A run of the pipeline into place/out; `more` ends with NULL. Fails the test when the status is another. */

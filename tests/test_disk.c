@@ -21,9 +21,7 @@ static batch_place place;
 static int setup(void **state)
 {
     (void)state;
-    place = batch_enter(FRAMES);
-    tool_result r = BATCH(&place, "plain", 0, "--quiet");
-    tool_result_free(&r);
+    place = batch_enter_plain(FRAMES);
     return 0;
 }
 
