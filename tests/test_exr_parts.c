@@ -227,7 +227,7 @@ static void test_no_camera(void **state)
     write_parts(folder, false, 0);
     expect_refusal(
         look("check", folder, manifest),
-        "c.exr: error: the file has no attribute worldToCamera; give camera.matrix in the manifest");
+        "c.exr: error: frame 1: the file has no attribute worldToCamera; give camera.matrix: 16 numbers");
 }
 
 int main(void)

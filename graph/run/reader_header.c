@@ -155,24 +155,21 @@ static rl_code read_camera(rl_reader *r, rl_frame *f, int file_number, rl_error 
     rl_camera_lens lens;
     rl_error inner = {0};
     bool has_jitter;
-    double matrix[16];
-    /* The manifest may be a preset's: the file is what to look at. */
-    if (r->setup.manifest->camera.matrix_source == RL_SOURCE_HEADER &&
-        !rl_camera_header_matrix(file, part, r->setup.manifest->camera.forward_z, matrix))
-        return rl_fail_file(
-            err, RL_E_FORMAT, rl_exr_path(file),
-            "the file has no attribute worldToCamera; give camera.matrix in the manifest: 16 numbers, "
-            "world to camera, rows listed, for column vectors (how to get them: configs/captures.md)");
     rl_code code = rl_camera_read(r->setup.manifest, file_number, file, part, &c, &lens, &has_jitter, &inner);
     if (!code) {
         report_camera(r, f, file_number, &lens, has_jitter);
         code = rl_camera_make(&c, &f->camera, &inner);
     }
-    if (code)
-        return rl_fail(err, code,
-                       (rl_where){inner.file[0] ? inner.file : rl_exr_path(file), inner.line, inner.column},
-                       "%s", inner.text);
-    return RL_OK;
+    if (!code)
+        return RL_OK;
+    /* What the header lacks is said of the file: the manifest may be a preset's. */
+    double matrix[16];
+    bool lacks = r->setup.manifest->camera.matrix_source == RL_SOURCE_HEADER &&
+                 !rl_camera_header_matrix(file, part, r->setup.manifest->camera.forward_z, matrix);
+    return rl_fail(err, code,
+                   inner.file[0] && !lacks ? (rl_where){inner.file, inner.line, inner.column}
+                                           : (rl_where){.file = rl_exr_path(file)},
+                   "%s", inner.text);
 }
 
 static bool same_box(rl_exr_box a, rl_exr_box b)
